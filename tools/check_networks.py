@@ -5,9 +5,10 @@
 
 The bundled scene and those below DATA (default $SCENES or scenes), each fitted once and not again
 while its run is there, colored by the network in DATA/teacher-places or by `--teacher FILE.onnx`.
-What is not there is skipped with a word. `--svg FILE` draws the loss after every round, `--rounds`
-compares fewer and more rounds than by default, as pictures of all views. Beside each run lie its
-contact sheet and eval/index.html, to be looked at. Needs numpy, Pillow, scikit-image, matplotlib.
+What is not there is skipped with a word. `--svg FILE` draws the loss after every round, `--stage-2`
+compares fewer and more rounds than by default, SH degrees, sizes of the network's input and solvers,
+as pictures of all views. Beside each run lie its contact sheet and eval/index.html, to be looked at.
+Needs numpy, Pillow, scikit-image, matplotlib.
 """
 
 from __future__ import annotations
@@ -49,9 +50,23 @@ HEAD = [
     "rounds",
     "seconds: teacher, solving, bake, measuring",
 ]
-ROUNDS = [2, 48]
-ROUNDS_HEAD = ["scene", "rounds", "last moved colors by", "loss"]
-ROUNDS_HEAD += ["ΔE00 to the most rounds, mean of all views", "held-out ΔE00"]
+# Options of `colorize` that are compared; sizes are those of a network that sees 224 pixels. The
+# first has the most rounds.
+STAGE_2 = {
+    "48 rounds at most": "--rounds 48",
+    "default": "",
+    "6 rounds": "--rounds 6",
+    "3 rounds": "--rounds 3",
+    "1 round": "--rounds 1",
+    "SH degree 1": "--sh-degree 1",
+    "SH degree 2": "--sh-degree 2",
+    "teacher at 112 px": "--teacher-size 112",
+    "teacher at 336 px": "--teacher-size 336",
+    "Adam, as the paper": "--solver adam",
+}
+STAGE_2_HEAD = ["scene", "`colorize`", "rounds", "seconds: all, teacher, solving, bake", "loss"]
+STAGE_2_HEAD += ["views agree, ours / teacher", "colorfulness", "ΔE00 to the most rounds, mean of all views"]
+STAGE_2_HEAD += ["held-out ΔE00"]
 
 
 def fitted(program: str, scene: Path, out: Path, flags: list[str]) -> None:
@@ -111,31 +126,31 @@ def far(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
     return float(np.mean(each))
 
 
-def compare_rounds(program: str, scene: str, out: Path, teacher: str, flags: list[str]) -> None:
-    """Rows of the second table: gray, few rounds, as many as by default, many rounds."""
-    found = {"gray": (pictures(program, out / "run", out / "gray", ["--luma"]), None)}
-    for rounds in [ROUNDS[0], None, ROUNDS[1]]:
-        copy = out / f"rounds-{rounds or 'default'}"
+def compare(program: str, scene: str, out: Path, teacher: str, flags: list[str]) -> None:
+    """Rows of the second table: gray, and every way to color."""
+    most = None
+    for place, (name, options) in enumerate(STAGE_2.items()):
+        copy = out / f"stage-2-{place}"
         shutil.rmtree(copy, ignore_errors=True)
         copy.mkdir()
-        for name in ("luma.ply", "report.json", "log.csv"):
-            shutil.copy(out / "run" / name, copy)
-        limit = ["--rounds", str(rounds)] if rounds else []
-        asked = [program, "colorize", str(copy), "--teacher", teacher, *limit, *flags, "--json"]
-        chroma = json.loads(run(asked)[0])["chroma"]
-        name = f"{chroma['iterations']}{'' if rounds else ' (default)'}"
-        found[name] = (pictures(program, copy, copy / "views", []), chroma)
-    most, _ = list(found.values())[-1]
-    for name, (views, chroma) in found.items():
-        apart = far(views, most)
-        cells = [scene, name]
-        if chroma is None:
-            cells += ["", ""]
-        else:
-            cells += [f"{chroma['moved']:.2f}", f"{chroma['loss']:.4f}"]
-        cells.append(judged(apart, apart <= NEAR or "default" not in name))
-        cells.append("" if chroma is None else f"{chroma['pictures']['delta_e']['mean']:.2f}")
-        line(cells)
+        for file in ("luma.ply", "report.json", "log.csv"):
+            shutil.copy(out / "run" / file, copy)
+        asked = [program, "colorize", str(copy), "--teacher", teacher, *shlex.split(options), *flags]
+        chroma = json.loads(run([*asked, "--json"])[0])["chroma"]
+        asked = [program, "eval", str(copy), "--teacher", teacher, "--frames", "2", "--json"]
+        between = by_method(json.loads(run(asked)[0])["between"]["consistency"])
+        views = pictures(program, copy, copy / "views", [])
+        most = most or views
+        apart, seconds = far(views, most), chroma["seconds"]
+        parts = [seconds["teacher"], seconds["distill"], seconds["bake"]]
+        found = chroma["pictures"]
+        cells = [scene, name, str(chroma["iterations"])]
+        cells.append(f"{sum(parts):.1f}: " + ", ".join(f"{part:.1f}" for part in parts))
+        cells += [f"{chroma['loss']:.4f}", judged(ratio(between["exported"], between["teacher"], "error"), True)]
+        cells += [f"{found['colorfulness']:.1f}", judged(apart, apart <= NEAR or name != "default")]
+        line([*cells, f"{found['delta_e']['mean']:.2f}"])
+    gray = pictures(program, out / "run", out / "gray", ["--luma"])
+    line([scene, "gray", *[""] * 5, judged(far(gray, most), True), ""])
 
 
 def draw(curves: dict[str, list[float]], path: Path) -> None:
@@ -167,7 +182,7 @@ def main() -> int:
     parser.add_argument("--colorize", default="", help="more flags for colorize, as one word")
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--scenes", nargs="*", default=[BUNDLED.name, *SCENES])
-    parser.add_argument("--rounds", action="store_true", help="print the second table instead")
+    parser.add_argument("--stage-2", action="store_true", help="print the second table instead")
     parser.add_argument("--svg", type=Path, help="where to draw the loss after every round")
     arguments = parser.parse_args()
     program, flags = arguments.program, shlex.split(arguments.colorize)
@@ -175,7 +190,7 @@ def main() -> int:
     if not teacher.is_file():
         print(f"{teacher} is not there: skipped", file=sys.stderr)
         return 0
-    head = ROUNDS_HEAD if arguments.rounds else HEAD
+    head = STAGE_2_HEAD if arguments.stage_2 else HEAD
     line(head)
     line(["---"] * len(head))
     curves = {}
@@ -186,8 +201,8 @@ def main() -> int:
             continue
         out = arguments.output / scene
         fitted(program, folder, out / "run", shlex.split(arguments.fit))
-        if arguments.rounds:
-            compare_rounds(program, scene, out, str(teacher), flags)
+        if arguments.stage_2:
+            compare(program, scene, out, str(teacher), flags)
             continue
         asked = [str(out / "run"), "--teacher", str(teacher)]
         chroma = json.loads(run([program, "colorize", *asked, *flags, "--json"])[0])["chroma"]

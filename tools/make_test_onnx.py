@@ -8,6 +8,7 @@ Needs `tools/requirements.txt` (only onnx). See `tests/fixtures/onnx/README.md` 
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 import onnx
@@ -316,6 +317,25 @@ def perceptual(path: Path, height: int | str, width: int | str) -> None:
     )  # fmt: skip
 
 
+def detector_tiny(path: Path) -> None:
+    """YOLOX's contract: one box of 16 x 8 pixels around (12, 10), scored by the channels' means."""
+    boxes, numbers, row = 21, 8, 5
+    constant = [0.0] * (boxes * numbers)
+    constant[row * numbers : row * numbers + 5] = [0.5, 0.25, math.log(2.0), 0.0, 1.0]
+    means = [0.0] * (3 * boxes * numbers)
+    for channel in range(3):
+        means[channel * boxes * numbers + row * numbers + 5 + channel] = 1 / 255
+    save(
+        path, [helper.make_node("ReduceMean", ["images"], ["mean"], axes=[2, 3], keepdims=0),
+               helper.make_node("Gemm", ["mean", "means", "constant"], ["flat"]),
+               helper.make_node("Reshape", ["flat", "shape"], ["output"])],
+        {"images": [1, 3, SIDE, SIDE]}, {"output": [1, boxes, numbers]},
+        [helper.make_tensor("means", TensorProto.FLOAT, [3, boxes * numbers], means),
+         helper.make_tensor("constant", TensorProto.FLOAT, [boxes * numbers], constant),
+         helper.make_tensor("shape", TensorProto.INT64, [3], [1, boxes, numbers])],
+    )  # fmt: skip
+
+
 def main() -> None:
     """Writes all files."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -327,6 +347,7 @@ def main() -> None:
         bigcolor_tiny,
         deoldify_tiny, deoldify_browser_tiny, half_tiny, int8_tiny, old_tiny, new_tiny,
         outside_tiny, pixels_tiny, two_answers_tiny, endless_tiny, wrong_rank, wrong_channels, two_inputs,
+        detector_tiny,
     ):  # fmt: skip
         make(folder / f"{make.__name__}.onnx")
     truncated(folder / "truncated.onnx", folder / "ddcolor_tiny.onnx")

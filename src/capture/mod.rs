@@ -111,6 +111,9 @@ const EXTENT_MARGIN: f64 = 1.1;
 /// for the scene's size, in one place.
 const COINCIDENT: f64 = 1e-4;
 
+/// Distances between cameras, as a share of that to what they see, that show no depth.
+const NO_BASELINE: f64 = 1e-3;
+
 /// Photos with poses, and the sparse points seen in them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capture {
@@ -286,6 +289,20 @@ impl Capture {
             _ if to_points > 0.0 => EXTENT_MARGIN * to_points,
             _ => 1.0,
         }
+    }
+
+    /// Returns true if all photos were taken from one place: then they show no depth.
+    pub fn is_panorama(&self) -> bool {
+        let center = self.center();
+        let apart = (self.views.iter()).map(|view| view.camera.center().distance(center));
+        let mut distances: Vec<f64> = (self.points.iter())
+            .map(|point| point.position.distance(center))
+            .collect();
+        let middle = distances.len() / 2;
+        distances.get(middle).is_some()
+            && self.views.len() > 1
+            && apart.fold(0.0, f64::max)
+                <= NO_BASELINE * *distances.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
     /// The mean of the camera centers.

@@ -269,6 +269,7 @@ impl Interruptible for AdamSolver<'_> {
     fn state(&self) -> Result<SolverState, ChromaError> {
         let mut state = SolverState::default();
         state.rounds.done = self.done;
+        state.rounds.seconds = self.seconds;
         for (name, buffer) in self.kept() {
             let values = buffer.read(self.gpu())?;
             state.buffers.insert(name.to_owned(), values);
@@ -278,6 +279,7 @@ impl Interruptible for AdamSolver<'_> {
 
     fn go_on_from(&mut self, state: &SolverState) -> bool {
         self.done = state.rounds.done;
+        self.seconds = state.rounds.seconds;
         let mut kept = self.kept().into_iter();
         kept.all(|(name, buffer)| state.put(name, buffer, self.gpu()))
     }

@@ -27,6 +27,8 @@ pub(super) struct SolveDecisions {
     pub uncorrected: Option<[f64; 2]>,
     /// The solver's last report.
     pub last: Option<ChromaProgress>,
+    /// Seconds of the distillation so far.
+    pub seconds: f64,
 }
 
 /// A solver between two rounds.
@@ -79,6 +81,8 @@ pub(super) struct Rounds {
     pub newest: usize,
     /// Passes over all views.
     pub spent: f64,
+    /// Seconds of these rounds.
+    pub seconds: f64,
 }
 
 /// Receiver of checkpoints.
@@ -186,6 +190,7 @@ mod tests {
                 }),
                 uncorrected: None,
                 last: None,
+                seconds: 2.5,
             },
             solver: SolverState {
                 rounds: Rounds {

@@ -185,6 +185,7 @@ impl Distill<'_> {
         observe: &mut ColorizeObserver<'_>,
     ) -> Result<Colored, ChromaError> {
         let begun = Instant::now();
+        let before = checkpoint.map_or(0.0, |found| found.state.seconds);
         // No photo is looked at any more.
         self.dataset.release();
         let (dataset, supervision, gpu) = (self.dataset, self.supervision, &self.raster.gpu);
@@ -226,6 +227,7 @@ impl Distill<'_> {
                         chosen: chosen.clone(),
                         uncorrected,
                         last: last.get(),
+                        seconds: before + begun.elapsed().as_secs_f64(),
                     },
                     solver: solver.state()?,
                 }))
@@ -268,7 +270,7 @@ impl Distill<'_> {
             saturation = match_saturation(&frozen, targets, &tasks, agreed, &mut chroma, told)?;
             peak = peak.max(gpu.allocated_bytes());
         }
-        let solving = begun.elapsed().as_secs_f64();
+        let solving = before + begun.elapsed().as_secs_f64();
         let begun = Instant::now();
         let splats = bake_telling(&frozen, self.luma, &chroma, &mut |step| {
             peak = peak.max(gpu.allocated_bytes());

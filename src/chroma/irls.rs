@@ -366,6 +366,7 @@ impl Interruptible for IrlsSolver<'_> {
             ended: self.ended,
             newest,
             spent: self.spent,
+            seconds: self.seconds,
         };
         Ok(SolverState {
             rounds,
@@ -395,6 +396,7 @@ impl Interruptible for IrlsSolver<'_> {
         self.anchored = rounds.anchored;
         self.ended = rounds.ended;
         self.spent = rounds.spent;
+        self.seconds = rounds.seconds;
         fits
     }
 }

@@ -10,7 +10,7 @@ use super::{
     network::NetworkArguments,
     next, print,
     progress::Progress,
-    values::{mebibytes, one_of},
+    values::{folder, mebibytes, named, one_of},
 };
 use crate::{
     eval::Peer,
@@ -40,7 +40,9 @@ const RECIPES: &[(Peer, &str)] = &[
 /// Measure a colored run: fidelity, colorfulness and consistency between views.
 #[derive(Args)]
 #[command(after_long_help = "Example:
-  gs-chroma eval runs/house --teacher ddcolor-tiny --baselines")]
+  gs-chroma eval runs/house --teacher ddcolor-tiny --baselines
+  gs-chroma eval runs/house --gray-frames gray/
+  gs-chroma eval runs/house --against film=colored/ --against brush=brush.ply")]
 pub struct Eval {
     /// Run folder [default: newest under runs/].
     run: Option<PathBuf>,
@@ -55,6 +57,12 @@ pub struct Eval {
     /// Also color the scene by ChromaDistill's recipe and measure that; repeatable.
     #[arg(long, help_heading = COMPARE, value_parser = one_of(RECIPES), requires = "teacher")]
     recipe: Vec<Peer>,
+    /// Also measure another program's colored splats, or its colors of the path's frames; repeatable.
+    ///
+    /// Splats lie in COLMAP's frame. A folder holds a PNG or JPEG for each frame of
+    /// --gray-frames, of the same size and in the same order.
+    #[arg(long, help_heading = COMPARE, value_name = "NAME=FILE|DIR", value_parser = named)]
+    against: Vec<(String, PathBuf)>,
     /// Limit device memory for --baselines and --recipe, in MiB.
     #[arg(long, help_heading = COMPARE, value_name = "MIB", value_parser = mebibytes(), requires = "teacher")]
     memory_limit: Option<u64>,
@@ -69,9 +77,15 @@ pub struct Eval {
     /// Perceptual distance such as LPIPS: two inputs [1,3,H,W] in [-1,1], one number out.
     #[arg(long, help_heading = MEASURES, value_name = "FILE.onnx")]
     lpips: Option<PathBuf>,
+    /// Count objects along the path: YOLOX, or another YOLO's decoded [1,N,5+classes] or [1,4+classes,N].
+    #[arg(long, help_heading = MEASURES, value_name = "FILE.onnx")]
+    detector: Option<PathBuf>,
     /// COLMAP folder, if it has moved since fit.
     #[arg(long, help_heading = INPUT, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
+    /// Write the path's frames in gray, for programs that color films.
+    #[arg(long, help_heading = OUTPUT, value_name = "DIR", value_parser = folder())]
+    gray_frames: Option<PathBuf>,
     /// Print eval.json.
     #[arg(long, help_heading = OUTPUT)]
     json: bool,
@@ -90,6 +104,9 @@ impl Eval {
             memory_limit: self.memory_limit,
             flow: self.flow,
             lpips: self.lpips,
+            detector: self.detector,
+            against: self.against,
+            gray_frames: self.gray_frames,
         };
         let mut progress = Progress::through(options.stages());
         let (folder, evaluation) = eval(&options, &mut |event| progress.show(&event))?;

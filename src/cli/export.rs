@@ -52,6 +52,9 @@ pub struct Export {
     /// Fit scales, opacities and colors to what this viewer draws.
     #[arg(long, help_heading = QUALITY, group = "before cameras", value_parser = one_of(VIEWERS))]
     viewer: Option<ViewerChoice>,
+    /// Keep opacities for viewers that antialias (Mip-Splatting), and mark the file so.
+    #[arg(long, help_heading = QUALITY, conflicts_with = "viewer")]
+    antialiased: bool,
     /// COLMAP folder with cameras for --clean and --viewer, of a splat file or a moved run.
     #[arg(long, help_heading = INPUT, value_name = "COLMAP_DIR", requires = "before cameras")]
     colmap: Option<PathBuf>,
@@ -72,6 +75,7 @@ impl Export {
             colmap_coordinates: self.colmap_coordinates,
             clean: self.clean,
             viewer: self.viewer,
+            antialiased: self.antialiased,
             colmap: self.colmap,
         };
         let mut progress = Progress::through(options.stages());
@@ -114,6 +118,7 @@ impl Export {
         let of_files = [
             ("--clean", self.clean),
             ("--viewer", self.viewer.is_some()),
+            ("--antialiased", self.antialiased),
             ("--colmap-coordinates", self.colmap_coordinates),
         ];
         for (name, _) in of_files.into_iter().filter(|(_, asked)| *asked) {

@@ -68,6 +68,9 @@ pub struct Fit {
     /// Measure held-out views at this longer side, in pixels [default: size of training].
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..), hide = true)]
     measure_side: Option<u32>,
+    /// Keep pictures of a held-out view during training, in album/ of the run folder.
+    #[arg(long, hide = true)]
+    album: bool,
     #[command(flatten)]
     effects: EffectArguments,
     #[command(flatten)]
@@ -158,6 +161,7 @@ impl Fit {
             preset: paper.or(self.preset).or(asked.preset),
             settings: overlay.over(asked.settings),
             measure_side: self.measure_side.or(asked.measure_side),
+            album: self.album,
             init: self.init.clone().map(Init::File).or(asked.init),
             goal: match (self.target_psnr, seconds) {
                 (Some(psnr), within) => Goal::Reach { psnr, within },

@@ -13,7 +13,7 @@ use super::{
     values::{folder, one_of, positive},
 };
 use crate::capture::lens::MODELS;
-use crate::prepare::{Cameras, Matching, PrepareOptions, Prepared, prepare};
+use crate::prepare::{CameraMotion, Cameras, Matching, PrepareOptions, Prepared, prepare};
 
 /// Options on cameras and their poses.
 const CAMERA: &str = "Cameras and poses";
@@ -25,6 +25,18 @@ const CAMERAS: &[(Cameras, &str)] = &[
         Cameras::Photo,
         "A camera for each photo, such as for a zoom lens",
     ),
+];
+
+const MOTIONS: &[(CameraMotion, &str)] = &[
+    (
+        CameraMotion::Moves,
+        "From place to place: depth can be found",
+    ),
+    (
+        CameraMotion::Turns,
+        "About one place, or it zooms: a panorama without depth",
+    ),
+    (CameraMotion::Stands, "Not at all"),
 ];
 
 const MATCHINGS: &[(Matching, &str)] = &[
@@ -66,6 +78,9 @@ pub struct InputArguments {
     /// COLMAP's camera model: OPENCV for visible distortion, OPENCV_FISHEYE for a fisheye.
     #[arg(long, help_heading = CAMERA, value_name = "MODEL", default_value = "SIMPLE_RADIAL", hide_possible_values = true, value_parser = PossibleValuesParser::new(MODELS.map(|model| model.name)))]
     lens: String,
+    /// How the camera moved [default: found out from the matches].
+    #[arg(long, help_heading = CAMERA, value_name = "HOW", value_parser = one_of(MOTIONS))]
+    camera: Option<CameraMotion>,
     /// How photos are matched [default: sequential for films and more than 200 photos].
     #[arg(long = "match", help_heading = CAMERA, value_name = "HOW", value_parser = one_of(MATCHINGS))]
     matching: Option<Matching>,
@@ -96,6 +111,7 @@ impl InputArguments {
             masks: self.masks,
             cameras: self.cameras,
             lens: self.lens,
+            camera: self.camera,
             matching: self.matching,
             install: self.install,
             force,

@@ -34,6 +34,9 @@ pub(super) fn of_run(error: &RunError) -> String {
         RunError::Eval(EvalError::Flow { .. }) => {
             format!("{error}: make it from the frames that `eval` writes, with as many --frames")
         }
+        RunError::Eval(EvalError::OtherFrames { .. }) => format!(
+            "{error}: color those of --gray-frames, with as many --frames, and keep their size"
+        ),
         RunError::Coarse { .. } => format!(
             "{error}: leave --colmap-coordinates out, and the file lies near the origin and says by how much"
         ),
@@ -230,6 +233,7 @@ fn of_teacher(error: &TeacherError) -> String {
             "{error}: choose another --teacher-device, or let ORT_DYLIB_PATH name a library that has it"
         ),
         TeacherError::UnknownProfile { .. } => format!("--teacher-profile {error}"),
+        TeacherError::NoClass { .. } => format!("{error}: leave out --teacher-class"),
         TeacherError::BadSize { path, size, reason } => {
             format!("{}: --teacher-size {size}: {reason}", path.display())
         }

@@ -19,13 +19,14 @@ use crate::{
 
 /// Measure quality against time on your own photos and device.
 ///
-/// Runs fit, and colorize with --teacher, with one setting changed at a time, then with pairs, and
-/// draws the Pareto front. The same command continues after an interruption.
+/// The first fit, and colorize with --teacher, already show what less time costs; then one setting
+/// at a time is changed, what tells most for its seconds first. The same command continues after an
+/// interruption.
 #[derive(Args)]
 #[command(after_long_help = "Example:
-  gs-chroma tradeoff house --budget 60
+  gs-chroma tradeoff house
   gs-chroma tradeoff house --preset balanced -- --max-side 800 --masks off
-  gs-chroma tradeoff house --teacher ddcolor-tiny --knobs iterations,max-side,rounds")]
+  gs-chroma tradeoff house --teacher ddcolor-tiny --knobs iterations,max-side,rounds --budget 60")]
 pub struct Tradeoff {
     /// COLMAP folder with images/ and sparse/.
     colmap_dir: PathBuf,
@@ -38,9 +39,9 @@ pub struct Tradeoff {
     /// Preset around which settings change [default: paper on a GPU, else draft].
     #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
-    /// Minutes for all points together, earlier starts included; the base always runs.
-    #[arg(long, help_heading = BUDGET, value_name = "MINUTES", default_value_t = 30.0, value_parser = positive::<f64>)]
-    budget: f64,
+    /// Minutes for all points together, earlier starts included [default: four times the base's].
+    #[arg(long, help_heading = BUDGET, value_name = "MINUTES", value_parser = positive::<f64>)]
+    budget: Option<f64>,
     /// Settings to change [default: all].
     #[arg(long, help_heading = BUDGET, value_name = "A,B,…", value_delimiter = ',', value_parser = PossibleValuesParser::new(knob_names()))]
     knobs: Vec<String>,
@@ -57,7 +58,7 @@ impl Tradeoff {
         let preset = self.preset.iter();
         let preset = preset.flat_map(|preset| ["--preset".to_owned(), preset.to_string()]);
         let fit: Vec<String> = preset.chain(self.fit).collect();
-        let words = ["gs-chroma", "fit", "scene", "-o", "point"].map(str::to_owned);
+        let words = ["gs-chroma", "fit", "scene", "-o", "point", "--album"].map(str::to_owned);
         if let Err(error) = program.try_get_matches_from(words.iter().chain(&fit)) {
             error.exit();
         }
@@ -67,7 +68,7 @@ impl Tradeoff {
             output: self.output,
             fit,
             teacher: self.teacher,
-            budget: 60.0 * self.budget,
+            budget: self.budget.map(|minutes| 60.0 * minutes),
             knobs: self.knobs,
         };
         let (folder, sweep) = tradeoff(&options, &mut |event| progress.show(&event))?;

@@ -25,7 +25,7 @@ pub(super) const PRESETS: &[(Preset, &str)] = &[
     ),
     (
         Preset::Paper,
-        "The last tenths of a dB, as in the ChromaDistill paper: 15,000 iterations, 3,000,000 Gaussians, full size; stops early below 0.1 dB",
+        "The last tenths of a dB: 15,000 iterations, 3,000,000 Gaussians, full size; stops early below 0.1 dB",
     ),
 ];
 
@@ -111,6 +111,17 @@ pub(super) fn mebibytes() -> impl TypedValueParser<Value = u64> {
     value_parser!(u32)
         .range(1..)
         .map(|mib| u64::from(mib) << 20)
+}
+
+/// `NAME=PATH`; the name stands in tables and files.
+pub(super) fn named(text: &str) -> Result<(String, PathBuf), String> {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    match text.split_once('=').unwrap_or_default() {
+        (name, path) if !name.is_empty() && !path.is_empty() && name.chars().all(is_plain) => {
+            Ok((name.to_owned(), path.into()))
+        }
+        _ => Err("give a name of letters, digits, - _ . and a path: film=colored/".to_owned()),
+    }
 }
 
 /// Frames a second: numerator and denominator, both positive.

@@ -126,8 +126,9 @@ impl Effect {
         match self {
             Self::Exposure => Some(8.0),
             Self::Background => Some(10.0),
-            // Antialiasing: on the smaller photos of a trial a pixel is larger, and so is what it
-            // gains: 0.5 dB where a whole run lost 0.15. Harmonics: only long runs learn them:
+            // It has to pay in viewers that do not antialias, which is never sure.
+            Self::Antialias => Some(f64::INFINITY),
+            // Harmonics: only long runs learn them:
             // trials said -0.06 to 0.04 dB of what gained up to 0.14. Outliers: what is far off is
             // told from what is not learned yet in long runs only, and a wrong decision costs
             // 0.05 dB (docs/lab/12-effects.md).
@@ -351,7 +352,7 @@ impl Evidence {
                 masks.overruled(overrules),
                 exposure,
                 robust.overruled(overrules),
-                antialias.overruled(overrules),
+                antialias.after(trials).overruled(overrules),
                 background.after(trials).overruled(overrules),
                 degree,
             ],

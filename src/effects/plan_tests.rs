@@ -91,8 +91,10 @@ fn a_trial_decides_where_the_evidence_is_in_doubt() {
     assert!(!needs(exposure(1.9)) && !needs(exposure(8.1)));
     let behind = |evidence| Decision::new(Effect::Background, Some(evidence), 1.0);
     assert!(needs(behind(1.5)) && !needs(behind(20.0)));
+    // Never sure to pay in viewers that do not antialias.
+    assert!(needs(Decision::new(Effect::Antialias, Some(50.0), 2.0)));
     // Of these a trial cannot tell.
-    for effect in [Effect::Robust, Effect::Antialias, Effect::LumaDegree] {
+    for effect in [Effect::Robust, Effect::LumaDegree] {
         let decision = Decision::new(effect, Some(1.01), 1.0);
         assert!(decision.on && !needs(decision), "{effect:?}");
     }

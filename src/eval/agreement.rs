@@ -3,10 +3,8 @@
 
 use std::{collections::VecDeque, path::Path};
 
-use image::RgbImage;
-
 use super::{
-    ColoredScene, Drawing, EvalError, Layer, Observer, Painter, Progress, Task,
+    ColoredScene, Drawing, EvalError, Layer, Observer, Painter, Progress, Task, mean_pictures,
     picture::{ab_of, to_picture},
 };
 use crate::{
@@ -14,7 +12,7 @@ use crate::{
     chroma::teacher::AbImage,
     input,
     measure::{Consistency, Flow, decode_flo, visible},
-    report::{BetweenScore, ConsistencyScore, Method, PathConsistency, PathScore, to_image},
+    report::{BetweenScore, ConsistencyScore, Method, PathConsistency, PathScore},
     trajectory::camera_path,
 };
 
@@ -48,7 +46,8 @@ struct Sums(Vec<(Method, Consistency)>);
 
 impl Frame {
     fn of(drawing: Drawing, depth: Vec<f32>) -> Self {
-        let colors = drawing.layers.iter().map(|(m, layer)| (*m, layer.ab()));
+        let ab = |(method, layer): &(Method, Layer)| (method.clone(), layer.ab());
+        let colors = drawing.layers.iter().map(ab);
         Self {
             colors: colors.collect(),
             camera: drawing.camera,
@@ -71,6 +70,22 @@ impl Frame {
         (forward, seen)
     }
 
+    /// [`Self::seen_from`] by the flow of files, if there are some, between these frames.
+    fn compared_with(
+        &self,
+        other: &Self,
+        [own, others]: [usize; 2],
+        flow_files: Option<&Path>,
+    ) -> Result<(Flow, Vec<bool>), EvalError> {
+        let Some(folder) = flow_files else {
+            return Ok(self.seen_from(other));
+        };
+        let forward = self.masked(read_flow(folder, [own, others], self.size())?);
+        let backward = other.masked(read_flow(folder, [others, own], other.size())?);
+        let seen = visible(&forward, &backward);
+        Ok((forward, seen))
+    }
+
     /// Takes what is not known where the scene has no depth out of another's flow.
     fn masked(&self, mut flow: Flow) -> Flow {
         for (vector, depth) in flow.vectors.iter_mut().zip(&self.depth) {
@@ -87,7 +102,7 @@ impl Sums {
         for ((method, ours), (other, theirs)) in first.colors.iter().zip(&second.colors) {
             debug_assert_eq!(method, other, "every frame has the same methods");
             if !self.0.iter().any(|(m, _)| m == method) {
-                self.0.push((*method, Consistency::default()));
+                self.0.push((method.clone(), Consistency::default()));
             }
             for (_, sum) in self.0.iter_mut().filter(|(m, _)| m == method) {
                 sum.add(ours, theirs, second.size(), flow, seen);
@@ -96,32 +111,36 @@ impl Sums {
     }
 
     fn scores(&self) -> Vec<ConsistencyScore> {
-        let score = |(method, sum): &(Method, Consistency)| ConsistencyScore::new(*method, sum);
+        let score = |(method, sum): &(Method, Consistency)| ConsistencyScore::new(method, sum);
         self.0.iter().map(score).collect()
     }
 }
 
-/// Draws a path of so many frames, gives each one's exported picture to `keep`, and compares
-/// frames by the scene's own geometry or by optical flow in `flow_files`, named
-/// `0000-0007.flo`.
-///
-/// # Errors
-/// [`EvalError`] of the device, the teacher or the flow, and whatever `keep` fails with.
-pub fn along_path<E: From<EvalError>>(
-    painter: &mut Painter<'_>,
-    scene: &ColoredScene,
-    frames: usize,
-    flow_files: Option<&Path>,
-    observe: &mut Observer<'_>,
-    keep: &mut dyn FnMut(usize, RgbImage) -> Result<(), E>,
-) -> Result<PathScore, E> {
+/// Cameras of a path of so many frames through the training views.
+pub fn path_of(scene: &ColoredScene, frames: usize) -> Vec<Camera> {
     let dataset = &scene.dataset;
     let train = &dataset.split.train;
     let cameras: Vec<Camera> = train.iter().map(|&i| small(&dataset.cameras[i])).collect();
     let cameras: Vec<&Camera> = cameras.iter().collect();
-    let path = camera_path(&cameras, dataset.extent, frames);
+    camera_path(&cameras, dataset.extent, frames)
+}
+
+/// Draws the frames of a path, gives each to `keep`, and compares them by the scene's own geometry
+/// or by optical flow in `flow_files`, named `0000-0007.flo`.
+///
+/// # Errors
+/// [`EvalError`] of the device, the teacher, frames of others or the flow, and whatever `keep`
+/// fails with.
+pub fn along_path<E: From<EvalError>>(
+    painter: &mut Painter<'_>,
+    path: &[Camera],
+    flow_files: Option<&Path>,
+    observe: &mut Observer<'_>,
+    keep: &mut dyn FnMut(usize, &Drawing) -> Result<(), E>,
+) -> Result<PathScore, E> {
     let mut sums: Vec<(usize, Sums)> = DELTAS.map(|delta| (delta, Sums::default())).into();
     let mut recent: VecDeque<Frame> = VecDeque::new();
+    let mut pictures = Vec::new();
     for (index, camera) in path.iter().enumerate() {
         observe(Progress {
             task: Task::Path,
@@ -129,27 +148,15 @@ pub fn along_path<E: From<EvalError>>(
             total: path.len(),
             name: "",
         });
-        let drawing = painter.draw(camera, &format!("frame {index}"))?;
-        if let Some(layer) = drawing.layer(Method::Exported) {
-            let pixels = layer.rgb(&drawing.gray);
-            keep(index, to_image(camera.width, camera.height, &pixels))?;
-        }
+        let drawing = painter.draw_frame(camera, index)?;
+        keep(index, &drawing)?;
+        pictures.extend(drawing.scores());
         let frame = Frame::of(drawing, painter.depth(camera)?);
         // The most recent frame is one back.
         let deltas: Vec<usize> = DELTAS.into_iter().filter(|&d| d <= recent.len()).collect();
         let compared = |delta: &usize| {
             let first = &recent[recent.len() - delta];
-            let Some(folder) = flow_files else {
-                return Ok(first.seen_from(&frame));
-            };
-            let read = |from: &Frame, names| {
-                let flow = read_flow(folder, names, from.size())?;
-                Ok::<_, EvalError>(from.masked(flow))
-            };
-            let forward = read(first, [index - delta, index])?;
-            let backward = read(&frame, [index, index - delta])?;
-            let seen = visible(&forward, &backward);
-            Ok((forward, seen))
+            first.compared_with(&frame, [index - delta, index], flow_files)
         };
         in_order(
             &deltas,
@@ -187,6 +194,8 @@ pub fn along_path<E: From<EvalError>>(
                 scores.map(move |score| PathConsistency { delta, score })
             })
             .collect(),
+        pictures: mean_pictures(pictures.iter()),
+        detections: Vec::new(),
     })
 }
 

@@ -2,12 +2,16 @@
 
 use std::sync::Arc;
 
-use super::{EvalError, Observer, Progress, Reference, Task};
+use super::{
+    EvalError, Observer, Progress, Reference, Task,
+    picture::{gray_picture, to_picture},
+    score::{mean, mean_error},
+};
 use crate::{
     capture::{Dataset, Exposure},
-    chroma::{Supervision, native_rgb, teacher::AbImage},
+    chroma::{Supervision, native_rgb},
     measure,
-    raster::{Raster, RenderedImage, SceneRenderer},
+    raster::{Raster, SceneRenderer},
     report::{ColorError, ColorQuality, ColorView, Row, to_image},
     splats::{ShField, Splats},
 };
@@ -79,7 +83,7 @@ impl Measured {
                 errors.push(ColorError::from(measure::mean_delta_e(&native, &exported)));
             }
             let taught = supervision.shown(i)?;
-            let taught = taught.map(|ab| teacher_picture(&photo.gray, &ab));
+            let taught = taught.map(|ab| native_rgb(&gray_picture(photo), &to_picture(&ab)));
             if measures && reference.measures() {
                 let shown = reference.shown(&exported);
                 let colorful = |rgb: &Vec<[f32; 3]>| reference.colorfulness(rgb);
@@ -112,7 +116,10 @@ impl Measured {
             Ok::<_, EvalError>(())
         })?;
         Ok(Self {
-            bake: mean_error(&errors),
+            bake: mean_error(errors.into_iter().map(Some)).unwrap_or(ColorError {
+                mean: f64::NAN,
+                percentile_95: f64::NAN,
+            }),
             views,
             rows,
         })
@@ -120,27 +127,11 @@ impl Measured {
 
     /// The mean over the views.
     pub fn mean(&self) -> ColorQuality {
-        let count = self.views.len().max(1) as f64;
-        let errors: Vec<ColorError> = self
-            .views
-            .iter()
-            .filter_map(|v| v.quality.delta_e)
-            .collect();
-        let taught: Vec<f64> = self
-            .views
-            .iter()
-            .filter_map(|view| view.quality.teacher_colorfulness)
-            .collect();
+        let all = || self.views.iter().map(|view| &view.quality);
         ColorQuality {
-            delta_e: (!errors.is_empty()).then(|| mean_error(&errors)),
-            colorfulness: self
-                .views
-                .iter()
-                .map(|v| v.quality.colorfulness)
-                .sum::<f64>()
-                / count,
-            teacher_colorfulness: (!taught.is_empty())
-                .then(|| taught.iter().sum::<f64>() / taught.len() as f64),
+            delta_e: mean_error(all().map(|quality| quality.delta_e)),
+            colorfulness: mean(all().map(|quality| Some(quality.colorfulness))).unwrap_or(0.0),
+            teacher_colorfulness: mean(all().map(|quality| quality.teacher_colorfulness)),
         }
     }
 }
@@ -157,26 +148,4 @@ fn caption(dataset: &Dataset, supervision: &Supervision, view: usize) -> String 
         (false, false) => " (held out: no color is learned from it)",
     };
     format!("{name}{role}")
-}
-
-fn mean_error(errors: &[ColorError]) -> ColorError {
-    let count = errors.len() as f64;
-    ColorError {
-        mean: errors.iter().map(|error| error.mean).sum::<f64>() / count,
-        percentile_95: errors.iter().map(|error| error.percentile_95).sum::<f64>() / count,
-    }
-}
-
-/// The photo's lightness with the teacher's a/b.
-fn teacher_picture(gray: &[u8], answer: &AbImage) -> Vec<[f32; 3]> {
-    let as_picture = |channels, pixels| RenderedImage {
-        width: answer.width,
-        height: answer.height,
-        channels,
-        pixels,
-    };
-    native_rgb(
-        &as_picture(1, gray.iter().map(|&v| f32::from(v) / 255.0).collect()),
-        &as_picture(2, answer.ab.as_flattened().to_vec()),
-    )
 }

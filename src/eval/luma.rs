@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{EvalError, Observer, Progress, Reference, Task};
 use crate::{
     capture::{Dataset, Exposure},
-    raster::{Raster, SceneRenderer},
+    raster::{Raster, RasterOptions, SceneRenderer, plain},
     report::{LumaQuality, LumaView, Row, to_image},
     splats::Splats,
 };
@@ -17,7 +17,20 @@ pub fn measure_luma(
     splats: &Splats,
     observe: &mut Observer<'_>,
 ) -> Result<Vec<LumaView>, EvalError> {
-    let mut renderer = SceneRenderer::of(raster, splats, &[&splats.sh], dataset.extent)?;
+    let extent = dataset.extent;
+    let mut renderer = SceneRenderer::of(raster, splats, &[&splats.sh], extent)?;
+    let viewer = raster.drawing(RasterOptions::default());
+    let exported = raster.options().antialiased.then(|| {
+        let cameras = dataset
+            .split
+            .train
+            .iter()
+            .map(|&view| &dataset.cameras[view]);
+        plain(splats, cameras, extent)
+    });
+    let plainly = exported.as_ref();
+    let plainly = plainly.map(|splats| SceneRenderer::of(&viewer, splats, &[&splats.sh], extent));
+    let mut plainly = plainly.transpose()?;
     let (mut views, mut done) = (Vec::new(), 0);
     dataset.visit(&dataset.split.test, |view, photo| {
         observe(Progress {
@@ -32,10 +45,18 @@ pub fn measure_luma(
             exposure: Exposure::NONE,
         };
         if reference.measures() {
-            let picture = renderer.render(&dataset.cameras[view])?.remove(0);
+            let camera = &dataset.cameras[view];
+            let mut quality_of = |renderer: &mut SceneRenderer| {
+                let picture = renderer.render(camera)?.remove(0);
+                Ok::<_, EvalError>(reference.luma_quality(&picture.pixels))
+            };
+            let plainly = plainly.as_mut().map(&mut quality_of).transpose()?;
             views.push(LumaView {
                 name: dataset.capture.views[view].name.clone(),
-                quality: reference.luma_quality(&picture.pixels),
+                quality: LumaQuality {
+                    plain_psnr: plainly.map(|quality| quality.psnr),
+                    ..quality_of(&mut renderer)?
+                },
             });
         }
         Ok::<_, EvalError>(())
@@ -95,12 +116,17 @@ pub fn mean_quality(views: &[LumaView]) -> Option<LumaQuality> {
     let mean = |value: fn(&LumaQuality) -> f64| {
         views.iter().map(|view| value(&view.quality)).sum::<f64>() / views.len() as f64
     };
+    let mean_of_known = |value: fn(&LumaQuality) -> Option<f64>| {
+        let sum = (views.iter())
+            .map(|view| value(&view.quality))
+            .sum::<Option<f64>>();
+        sum.map(|sum| sum / views.len() as f64)
+    };
     (!views.is_empty()).then(|| LumaQuality {
         psnr: mean(|quality| quality.psnr),
-        corrected_psnr: (views.iter())
-            .map(|view| view.quality.corrected_psnr)
-            .sum::<Option<f64>>()
-            .map(|sum| sum / views.len() as f64),
+        corrected_psnr: mean_of_known(|quality| quality.corrected_psnr),
+        plain_psnr: mean_of_known(|quality| quality.plain_psnr),
+        lost_detail: mean_of_known(|quality| quality.lost_detail),
         ssim: mean(|quality| quality.ssim),
     })
 }

@@ -2,9 +2,13 @@
 
 mod agreement;
 mod colored;
+mod detections;
+mod detector;
 mod lpips;
 mod luma;
+mod network;
 mod painter;
+mod path_frames;
 mod peers;
 mod picture;
 mod progress;
@@ -15,16 +19,18 @@ mod teacher;
 
 use std::path::PathBuf;
 
-pub use agreement::{along_path, between_views};
+pub use agreement::{along_path, between_views, path_of};
 pub use colored::{COLUMNS, Measured};
+pub use detector::{Detected, Detector};
 pub use lpips::Lpips;
 pub use luma::{GRAY_COLUMNS, gray_rows, mean_quality, measure_luma};
-pub use painter::{Drawing, Layer, Painter};
+pub use painter::{Drawing, Layer, Painter, Source};
+pub use path_frames::frames_in;
 pub use peers::Peer;
 pub use progress::{Observer, Progress, Task};
 pub use reference::{Reference, exposures};
 pub use scene::ColoredScene;
-pub use score::{Scored, mean_bake, mean_luma, mean_pictures, strengths};
+pub use score::{Scored, Shot, mean_bake, mean_luma, mean_pictures, strengths};
 pub use teacher::MeasuredTeacher;
 
 use crate::{
@@ -50,7 +56,23 @@ pub enum EvalError {
     /// The teacher has no colors for any of the views.
     #[error("the teacher has no colors for these views")]
     NothingTaught,
-    /// The perceptual network cannot be used.
+    /// Pictures of another program are not those of the path's frames.
+    #[error("{}: {reason}", path.display())]
+    OtherFrames {
+        /// The folder or the file.
+        path: PathBuf,
+        /// Number or size of the pictures, and that of the path.
+        reason: String,
+    },
+    /// A frame of the path cannot be read.
+    #[error("{}: {reason}", path.display())]
+    Frame {
+        /// The file.
+        path: PathBuf,
+        /// Defect, and remedy.
+        reason: String,
+    },
+    /// A network that measures cannot be used.
     #[error("{}: {reason}", path.display())]
     Network {
         /// The model.

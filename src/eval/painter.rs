@@ -1,9 +1,10 @@
 //! One viewpoint, drawn by every method.
 
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
 use super::{
     ColoredScene, EvalError, MeasuredTeacher,
+    path_frames::read_frame,
     picture::{ab_of, to_picture},
 };
 use crate::{
@@ -11,16 +12,27 @@ use crate::{
     chroma::{native_rgb, teacher::AbImage},
     raster::{Raster, RenderedImage, SceneRenderer},
     report::Method,
-    splats::ShField,
+    splats::{ShField, Splats},
 };
 
 /// Draws every method's picture.
 pub struct Painter<'a> {
     renderer: SceneRenderer<'a>,
-    has_native: bool,
-    /// Methods that are RGB splats, in the order of their fields.
-    rgb: Vec<Method>,
+    /// Methods that are harmonics on the scene's geometry, in the order of their fields.
+    fields: Vec<Method>,
+    splats: Vec<(Method, SceneRenderer<'a>)>,
+    frames: Vec<(Method, &'a [PathBuf])>,
     teacher: Option<&'a mut MeasuredTeacher>,
+}
+
+/// Source of a method's pictures.
+pub enum Source<'a> {
+    /// Harmonics of RGB, or of a and b, on the scene's geometry.
+    Field(&'a ShField),
+    /// Splats with a geometry of their own, and what draws them.
+    Splats(&'a Splats, Arc<Raster>),
+    /// Files of the path's frames, in its order, and of nothing else.
+    Frames(&'a [PathBuf]),
 }
 
 /// A colored picture as a method makes it.
@@ -42,22 +54,35 @@ pub struct Drawing {
 }
 
 impl<'a> Painter<'a> {
-    /// A painter of the scene's own pictures, of RGB splats on its geometry, and of
-    /// what a teacher makes of the gray pictures.
+    /// A painter of the gray scene, of what methods make of it, and of what a teacher makes of the
+    /// gray pictures.
     pub fn new(
         raster: &Arc<Raster>,
         scene: &'a ColoredScene,
-        rgb: &[(Method, &'a ShField)],
+        sources: impl IntoIterator<Item = (Method, Source<'a>)>,
         teacher: Option<&'a mut MeasuredTeacher>,
     ) -> Result<Self, EvalError> {
-        let dataset = &scene.dataset;
-        let mut fields = vec![&scene.luma.sh];
-        fields.extend(rgb.iter().map(|&(_, field)| field));
-        fields.extend(&scene.chroma);
+        let extent = scene.dataset.extent;
+        let mut drawn = vec![&scene.luma.sh];
+        let (mut fields, mut splats, mut frames) = (Vec::new(), Vec::new(), Vec::new());
+        for (method, source) in sources {
+            match source {
+                Source::Field(field) => {
+                    drawn.push(field);
+                    fields.push(method);
+                }
+                Source::Splats(own, raster) => {
+                    let renderer = SceneRenderer::of(&raster, own, &[&own.sh], extent)?;
+                    splats.push((method, renderer));
+                }
+                Source::Frames(files) => frames.push((method, files)),
+            }
+        }
         Ok(Self {
-            renderer: SceneRenderer::of(raster, &scene.luma, &fields, dataset.extent)?,
-            has_native: scene.chroma.is_some(),
-            rgb: rgb.iter().map(|(method, _)| *method).collect(),
+            renderer: SceneRenderer::of(raster, &scene.luma, &drawn, extent)?,
+            fields,
+            splats,
+            frames,
             teacher,
         })
     }
@@ -65,14 +90,13 @@ impl<'a> Painter<'a> {
     /// Draws what `camera` sees; `name` is for the teacher's errors.
     pub fn draw(&mut self, camera: &Camera, name: &str) -> Result<Drawing, EvalError> {
         let mut pictures = self.renderer.render(camera)?;
-        // One picture a field: gray, RGB, and a/b last.
         let gray = pictures.remove(0);
-        let mut layers = Vec::new();
-        if self.has_native {
-            layers.extend(pictures.pop().map(|ab| (Method::Native, Layer::Ab(ab))));
-        }
-        for (&method, picture) in self.rgb.iter().zip(&pictures) {
-            layers.push((method, Layer::Rgb(picture.shown())));
+        let mut layers: Vec<(Method, Layer)> = (self.fields.iter().cloned())
+            .zip(pictures.into_iter().map(Layer::of))
+            .collect();
+        for (method, renderer) in &mut self.splats {
+            let pictures = renderer.render(camera)?.into_iter();
+            layers.extend(pictures.map(|picture| (method.clone(), Layer::of(picture))));
         }
         if let Some(teacher) = &mut self.teacher
             && let Some(answer) = teacher.color_frame(name, &gray)?
@@ -90,6 +114,16 @@ impl<'a> Painter<'a> {
     pub fn exported(&mut self, camera: &Camera) -> Result<Vec<[f32; 3]>, EvalError> {
         // Its field comes first after luma's.
         Ok(self.renderer.render(camera)?.swap_remove(1).shown())
+    }
+
+    /// Draws a frame of the path, by its index.
+    pub fn draw_frame(&mut self, camera: &Camera, index: usize) -> Result<Drawing, EvalError> {
+        let mut drawing = self.draw(camera, &format!("frame {index}"))?;
+        for (method, files) in &self.frames {
+            let layer = Layer::Rgb(read_frame(&files[index], camera)?);
+            drawing.layers.push((method.clone(), layer));
+        }
+        Ok(drawing)
     }
 
     /// The scene's median depth along the camera's z axis in world units, `[height,
@@ -122,13 +156,20 @@ impl<'a> Painter<'a> {
 
 impl Drawing {
     /// A method's picture, where there is one.
-    pub fn layer(&self, method: Method) -> Option<&Layer> {
-        let found = self.layers.iter().find(|(m, _)| *m == method);
+    pub fn layer(&self, method: &Method) -> Option<&Layer> {
+        let found = self.layers.iter().find(|(m, _)| m == method);
         found.map(|(_, layer)| layer)
     }
 }
 
 impl Layer {
+    fn of(picture: RenderedImage) -> Self {
+        match picture.channels {
+            2 => Self::Ab(picture),
+            _ => Self::Rgb(picture.shown()),
+        }
+    }
+
     /// a and b of each pixel, `[height, width]`.
     pub fn ab(&self) -> Vec<[f32; 2]> {
         match self {

@@ -21,6 +21,18 @@ pub fn gray_picture(photo: &Photo) -> RenderedImage {
     }
 }
 
+/// A drawn gray picture as a photo of 8 bits.
+pub fn as_photo(gray: &RenderedImage) -> Photo {
+    let byte = |&v: &f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+    Photo {
+        width: gray.width,
+        height: gray.height,
+        gray: gray.pixels.iter().map(byte).collect(),
+        rgb: None,
+        mask: None,
+    }
+}
+
 /// A teacher's answer as a picture of two channels.
 pub fn to_picture(answer: &AbImage) -> RenderedImage {
     RenderedImage {

@@ -99,8 +99,22 @@ impl<'a> Reference<'a> {
         LumaQuality {
             psnr: measure::reported_psnr(&ours, &right),
             corrected_psnr: Some(measure::corrected_psnr(&ours, &right)),
+            plain_psnr: None,
+            lost_detail: Some(self.lost_detail(&shown, &truth)),
             ssim: self.ssim(&shown, &truth),
         }
+    }
+
+    /// Share of the photo's textured blocks of which a picture shows hardly any detail.
+    fn lost_detail(&self, shown: &[f32], truth: &[f32]) -> f64 {
+        let (width, height) = (self.photo.width as usize, self.photo.height as usize);
+        measure::lost_detail(width, height, &self.patched(shown, truth), truth)
+    }
+
+    /// PSNR of a gray picture where it counts, in dB.
+    pub fn gray_psnr(&self, gray: &[f32]) -> f64 {
+        let shown: Vec<f32> = gray.iter().map(|value| value.clamp(0.0, 1.0)).collect();
+        measure::reported_psnr(&self.counted(&shown), &self.counted(&self.gray()))
     }
 
     /// Variance of the Laplacian of a gray picture where it counts, on the scale of 0 to 255.

@@ -1,10 +1,13 @@
 //! Pictures of a view against its photo.
 
+use std::collections::BTreeSet;
+
 use super::{
     ColoredScene, Drawing, EvalError, Layer, Lpips, Observer, Painter, Progress, Reference, Task,
-    picture::{ab_of, gray_picture, to_picture},
+    picture::{ab_of, as_photo, gray_picture, to_picture},
 };
 use crate::{
+    capture::Exposure,
     chroma::teacher::AbImage,
     color::gray_from_rgb,
     measure,
@@ -26,24 +29,78 @@ pub struct Scored {
 /// A picture for the page.
 pub struct Shot {
     /// Part of its file's name.
-    pub file: &'static str,
-    pub caption: &'static str,
+    pub file: String,
+    pub caption: String,
     /// RGB in [0, 1], `[height, width]`.
     pub pixels: Vec<[f32; 3]>,
 }
 
-/// Methods on the page, and part of their files' names; the exported picture stands for the
-/// native one, and what that costs is the bake's figure.
-const SHOWN: [(Method, &str); 8] = [
-    (Method::Teacher, "teacher"),
-    (Method::Exported, "ours"),
-    (Method::RgbSplats, "rgb-splats"),
-    (Method::ChromadistillPaper, "chromadistill-paper"),
-    (Method::ChromadistillOneScale, "chromadistill-one-scale"),
-    (Method::ChromadistillCode, "chromadistill-code"),
-    (Method::ChromadistillRgb, "chromadistill-rgb"),
-    (Method::PerFrame, "per-frame"),
-];
+impl Shot {
+    fn new(file: &str, caption: &str, pixels: Vec<[f32; 3]>) -> Self {
+        Self {
+            file: file.to_owned(),
+            caption: caption.to_owned(),
+            pixels,
+        }
+    }
+
+    /// A method's picture.
+    pub fn of(method: &Method, pixels: Vec<[f32; 3]>) -> Self {
+        Self::new(&method.file_stem(), method.name(), pixels)
+    }
+}
+
+impl Drawing {
+    /// Pictures for people, RGB in [0, 1]: the gray one and each method's. The exported one stands
+    /// for the native one: what that costs is the bake's figure.
+    pub fn pictures(&self) -> Vec<(Method, Vec<[f32; 3]>)> {
+        let layers = self.layers.iter();
+        let layers = layers.filter(|(method, _)| *method != Method::Native);
+        let layers = layers.map(|(method, layer)| (method.clone(), layer.rgb(&self.gray)));
+        let luma = (Method::Luma, self.gray.shown());
+        [luma].into_iter().chain(layers).collect()
+    }
+
+    /// Scores of each method's picture against the gray one in 8 bits.
+    pub fn scores(&self) -> Vec<PictureScore> {
+        let reference = Reference {
+            photo: &as_photo(&self.gray),
+            exposure: Exposure::NONE,
+        };
+        let score = |(method, layer): &(Method, Layer)| {
+            score(reference, method, &layer.rgb(&self.gray), &layer.ab())
+        };
+        self.layers.iter().map(score).collect()
+    }
+}
+
+/// A method's picture, as the photo would show it, against the photo.
+fn score(
+    reference: Reference<'_>,
+    method: &Method,
+    rgb: &[[f32; 3]],
+    ab: &[[f32; 2]],
+) -> PictureScore {
+    // Fidelity to a gray photo's colors is no figure.
+    let truth = reference.rgb();
+    let truth = truth.as_deref();
+    let (counted, ab) = (reference.counted(rgb), reference.counted(ab));
+    let wanted = truth.map(|truth| reference.counted(truth));
+    let wanted = wanted.as_deref();
+    let gray = gray_of(rgb);
+    PictureScore {
+        method: method.clone(),
+        psnr: wanted.map(|t| measure::reported_psnr(counted.as_flattened(), t.as_flattened())),
+        ssim: truth.map(|t| rgb_ssim(reference, rgb, t)),
+        delta_e: truth.map(|t| reference.color_error(rgb, t)),
+        ab_error: wanted.map(|t| measure::ab_error(&ab, &ab_of(t))),
+        colorfulness: measure::colorfulness(&counted),
+        diversity: measure::color_diversity(&ab),
+        gray_psnr: reference.gray_psnr(&gray),
+        sharpness: reference.sharpness(&gray),
+        lpips: None,
+    }
+}
 
 impl Scored {
     /// Measures what was drawn, and the teacher's answer, against a photo: what was drawn
@@ -57,73 +114,53 @@ impl Scored {
     ) -> Result<Self, EvalError> {
         let photo = reference.photo;
         let size = [photo.width, photo.height];
-        let shown = photo.rgb_values();
+        let photo_rgb = photo.rgb_values();
         let luma_shown = reference.luma_shown(&drawing.gray.pixels);
-        let drawn_gray = rgb_of(&luma_shown);
-        let mut shots = Vec::new();
-        let mut show = |file, caption, pixels| {
-            shots.push(Shot {
-                file,
-                caption,
-                pixels,
-            })
-        };
-        show("photo", "photo", shown.clone());
-        show("luma", "luma", drawn_gray.clone());
+        let mut shots = vec![
+            Shot::of(&Method::Photo, photo_rgb.clone()),
+            Shot::of(&Method::Luma, rgb_of(&luma_shown)),
+        ];
         let luma = luma_score(reference, drawing, &luma_shown, lpips.as_deref_mut())?;
-        // Fidelity to a gray photo's colors is no figure.
-        let truth = reference.rgb();
-        let truth = truth.as_deref();
-        let mut scores = Vec::new();
-        let mut rendered = Vec::new();
-        let mut score = |method: Method, rgb: Vec<[f32; 3]>, ab: &[[f32; 2]]| {
-            let counted = reference.counted(&rgb);
-            let wanted = truth.map(|truth| reference.counted(truth));
-            let wanted = wanted.as_deref();
-            let gray = gray_of(&rgb);
-            scores.push(PictureScore {
-                method,
-                psnr: wanted
-                    .map(|t| measure::reported_psnr(counted.as_flattened(), t.as_flattened())),
-                ssim: truth.map(|t| rgb_ssim(reference, &rgb, t)),
-                delta_e: truth.map(|t| reference.color_error(&rgb, t)),
-                ab_error: wanted.map(|t| measure::ab_error(&reference.counted(ab), &ab_of(t))),
-                colorfulness: measure::colorfulness(&counted),
-                diversity: measure::color_diversity(&reference.counted(ab)),
-                gray_psnr: reference.luma_quality(&gray).psnr,
-                sharpness: reference.sharpness(&gray),
-                lpips: match (&mut lpips, truth) {
-                    (Some(lpips), Some(t)) => {
-                        Some(lpips.distance(&reference.patched(&rgb, t), t, size)?)
-                    }
-                    _ => None,
-                },
-            });
-            rendered.push((method, rgb));
-            Ok::<_, EvalError>(())
-        };
-        for (method, layer) in &drawing.layers {
+        let layers = drawing.layers.iter().map(|(method, layer)| {
             let rgb = reference.shown(&layer.rgb(&drawing.gray));
-            score(*method, rgb, &layer.ab())?;
-        }
-        if let Some(answer) = answer {
+            (method.clone(), rgb, layer.ab())
+        });
+        let taught = answer.map(|answer| {
             let layer = Layer::Ab(to_picture(answer));
-            score(Method::Teacher, layer.rgb(&gray_picture(photo)), &answer.ab)?;
-        }
-        let of = |method: Method| {
-            let found = rendered.iter().find(|(m, _)| *m == method);
-            found.map(|(_, rgb)| rgb)
+            (
+                Method::Teacher,
+                layer.rgb(&gray_picture(photo)),
+                answer.ab.clone(),
+            )
+        });
+        let mut pictures: Vec<_> = layers.chain(taught).collect();
+        pictures.sort_by(|(a, ..), (b, ..)| a.cmp(b));
+        let of = |method: &Method| {
+            let mut all = pictures.iter();
+            Some(&all.find(|(own, ..)| own == method)?.1)
         };
-        for (method, file) in SHOWN {
-            if let Some(rgb) = of(method) {
-                show(file, method.name(), rgb.clone());
+        // Where photos are gray, the teacher's colors are the only ones.
+        let truth = reference.rgb();
+        let wanted = truth.as_ref().or(of(&Method::Teacher));
+        let mut scores = Vec::new();
+        for (method, rgb, ab) in &pictures {
+            let mut own = score(reference, method, rgb, ab);
+            if let (Some(lpips), Some(wanted)) = (lpips.as_deref_mut(), wanted)
+                && !std::ptr::eq(wanted, rgb)
+            {
+                own.lpips = Some(lpips.distance(&reference.patched(rgb, wanted), wanted, size)?);
+            }
+            scores.push(own);
+            if *method != Method::Native {
+                shots.push(Shot::of(method, rgb.clone()));
             }
         }
-        if let (Some(truth), Some(exported)) = (truth, of(Method::Exported)) {
+        if let (Some(truth), Some(exported)) = (&truth, of(&Method::Exported)) {
             for (file, caption, errors) in error_maps(drawing, answer, exported, truth) {
                 // Pixels that do not count have no error.
                 let none = vec![0.0; errors.len()];
-                show(file, caption, error_map(&reference.patched(&errors, &none)));
+                let map = error_map(&reference.patched(&errors, &none));
+                shots.push(Shot::new(file, caption, map));
             }
         }
         scores.push(PictureScore {
@@ -132,8 +169,8 @@ impl Scored {
             ssim: None,
             delta_e: None,
             ab_error: None,
-            colorfulness: reference.colorfulness(&shown),
-            diversity: measure::color_diversity(&reference.counted(&ab_of(&shown))),
+            colorfulness: reference.colorfulness(&photo_rgb),
+            diversity: measure::color_diversity(&reference.counted(&ab_of(&photo_rgb))),
             gray_psnr: measure::IDENTICAL_PSNR,
             sharpness: luma.photo_sharpness,
             lpips: None,
@@ -168,6 +205,7 @@ fn luma_score(
     Ok(LumaScore {
         psnr: quality.psnr,
         corrected_psnr: quality.corrected_psnr,
+        plain_psnr: None,
         ssim: quality.ssim,
         sharpness: reference.sharpness(shown),
         photo_sharpness: reference.sharpness(&wanted),
@@ -183,7 +221,7 @@ fn error_maps(
     truth: &[[f32; 3]],
 ) -> Vec<(&'static str, &'static str, Vec<f64>)> {
     let wanted = ab_of(truth);
-    let ab = drawing.layer(Method::Exported).map(Layer::ab);
+    let ab = drawing.layer(&Method::Exported).map(Layer::ab);
     let ours = ab.map(|ab| ("ab", "a/b error, ours", distances(&ab, &wanted)));
     let teacher = answer.map(|answer| {
         let errors = distances(&answer.ab, &wanted);
@@ -210,7 +248,7 @@ fn gray_of(rgb: &[[f32; 3]]) -> Vec<f32> {
 /// Color error of the export, under the scene's own exposure.
 fn bake(drawing: &Drawing) -> Option<ColorError> {
     let of = |method| Some(drawing.layer(method)?.rgb(&drawing.gray));
-    let (native, exported) = (of(Method::Native)?, of(Method::Exported)?);
+    let (native, exported) = (of(&Method::Native)?, of(&Method::Exported)?);
     Some(measure::mean_delta_e(&native, &exported).into())
 }
 
@@ -227,12 +265,14 @@ fn rgb_ssim(reference: Reference<'_>, shown: &[[f32; 3]], truth: &[[f32; 3]]) ->
 }
 
 /// The mean of those that are there.
-fn mean(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+pub(super) fn mean(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let values: Vec<f64> = values.flatten().collect();
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-fn mean_error(errors: impl Iterator<Item = Option<ColorError>> + Clone) -> Option<ColorError> {
+pub(super) fn mean_error(
+    errors: impl Iterator<Item = Option<ColorError>> + Clone,
+) -> Option<ColorError> {
     Some(ColorError {
         mean: mean(errors.clone().map(|e| Some(e?.mean)))?,
         percentile_95: mean(errors.map(|e| Some(e?.percentile_95)))?,
@@ -245,6 +285,7 @@ pub fn mean_luma(views: &[Scored]) -> LumaScore {
     LumaScore {
         psnr: mean(lumas().map(|l| Some(l.psnr))).unwrap_or(f64::NAN),
         corrected_psnr: mean(lumas().map(|l| l.corrected_psnr)),
+        plain_psnr: None,
         ssim: mean(lumas().map(|l| Some(l.ssim))).unwrap_or(f64::NAN),
         sharpness: mean(lumas().map(|l| Some(l.sharpness))).unwrap_or(f64::NAN),
         photo_sharpness: mean(lumas().map(|l| Some(l.photo_sharpness))).unwrap_or(f64::NAN),
@@ -291,28 +332,26 @@ pub fn mean_bake(views: &[Scored]) -> Option<ColorError> {
     mean_error(views.iter().map(|view| view.bake))
 }
 
-/// Each method's mean over the views that have it.
-pub fn mean_pictures(views: &[Scored]) -> Vec<PictureScore> {
-    let all = || views.iter().flat_map(|view| &view.score.pictures);
-    let mut methods: Vec<Method> = all().map(|score| score.method).collect();
-    methods.sort();
-    methods.dedup();
-    methods
-        .into_iter()
-        .map(|method| {
-            let own = || all().filter(move |score| score.method == method);
-            PictureScore {
-                method,
-                psnr: mean(own().map(|s| s.psnr)),
-                ssim: mean(own().map(|s| s.ssim)),
-                delta_e: mean_error(own().map(|s| s.delta_e)),
-                ab_error: mean(own().map(|s| s.ab_error)),
-                colorfulness: mean(own().map(|s| Some(s.colorfulness))).unwrap_or(f64::NAN),
-                diversity: mean(own().map(|s| Some(s.diversity))).unwrap_or(f64::NAN),
-                gray_psnr: mean(own().map(|s| Some(s.gray_psnr))).unwrap_or(f64::NAN),
-                sharpness: mean(own().map(|s| Some(s.sharpness))).unwrap_or(f64::NAN),
-                lpips: mean(own().map(|s| s.lpips)),
-            }
-        })
-        .collect()
+/// Each method's mean over the pictures that have it.
+pub fn mean_pictures<'a>(all: impl Iterator<Item = &'a PictureScore> + Clone) -> Vec<PictureScore> {
+    let methods: BTreeSet<&Method> = all.clone().map(|score| &score.method).collect();
+    let of = |method: &Method| {
+        let own = || all.clone().filter(|score| score.method == *method);
+        let each = |value: fn(&PictureScore) -> f64| {
+            mean(own().map(|score| Some(value(score)))).unwrap_or(f64::NAN)
+        };
+        PictureScore {
+            method: method.clone(),
+            psnr: mean(own().map(|s| s.psnr)),
+            ssim: mean(own().map(|s| s.ssim)),
+            delta_e: mean_error(own().map(|s| s.delta_e)),
+            ab_error: mean(own().map(|s| s.ab_error)),
+            colorfulness: each(|s| s.colorfulness),
+            diversity: each(|s| s.diversity),
+            gray_psnr: each(|s| s.gray_psnr),
+            sharpness: each(|s| s.sharpness),
+            lpips: mean(own().map(|s| s.lpips)),
+        }
+    };
+    methods.into_iter().map(of).collect()
 }

@@ -1,7 +1,7 @@
 //! The teacher as one to be measured: its own pictures, and what it makes of the gray
 //! scene frame by frame.
 
-use super::{EvalError, Observer, Progress, Task as Step};
+use super::{EvalError, Observer, Progress, Task as Step, picture::as_photo};
 use crate::{
     capture::Dataset,
     chroma::{
@@ -87,12 +87,11 @@ impl MeasuredTeacher {
         let Some(teacher) = &mut self.frames else {
             return Ok(None);
         };
-        let byte = |&v: &f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
-        let pixels: Vec<u8> = gray.pixels.iter().map(byte).collect();
+        let photo = as_photo(gray);
         let gray = GrayImage {
-            width: gray.width,
-            height: gray.height,
-            pixels: &pixels,
+            width: photo.width,
+            height: photo.height,
+            pixels: &photo.gray,
         };
         Ok(teacher.colorize(name, gray, None)?)
     }

@@ -7,8 +7,8 @@ use std::{
 };
 
 use super::{
-    Checkpoint, Checkpointing, CurvePoint, Demand, Goal, Grows, LumaError, LumaProgress,
-    LumaSettings, LumaTrainer, NoCheckpoints, PlannedViews, TrialProgress,
+    AlbumPicture, Checkpoint, Checkpointing, CurvePoint, Demand, Goal, Grows, LumaError,
+    LumaProgress, LumaSettings, LumaTrainer, NoCheckpoints, PlannedViews, TrialProgress,
     carve::carved,
     planned, resident_photos,
     start::{placed_splats, started, surroundings},
@@ -41,6 +41,8 @@ pub struct LumaScene {
     pub iterations: usize,
     /// Held-out scores of the validations during training.
     pub curve: Vec<CurvePoint>,
+    /// Pictures of one view at some of these; none unless asked for.
+    pub album: Vec<AlbumPicture>,
     /// The iteration at which the training gave up what had brought no gain.
     pub given_up: Option<usize>,
     /// The last report.
@@ -132,6 +134,7 @@ pub fn fit(
         exposures: None,
         grows: None,
         watched: None,
+        album: false,
     }
     .run(settings, observe)
 }
@@ -160,6 +163,8 @@ pub struct Fit<'a> {
     pub grows: Option<Grows>,
     /// Views that are looked at on the way; a few of the held-out ones by default.
     pub watched: Option<(&'a Arc<Dataset>, Vec<usize>)>,
+    /// True to keep pictures of one of them.
+    pub album: bool,
 }
 
 impl Fit<'_> {
@@ -227,13 +232,7 @@ impl Fit<'_> {
             Some(limit) => self.goal.with_seconds(limit - preparing),
             None => self.goal,
         });
-        let (photographed, views) = self.watched();
-        let exposures = plan.exposures.clone();
-        trainer.watch(PlannedViews::watched(
-            photographed.clone(),
-            views,
-            exposures,
-        ))?;
+        self.watch(&mut trainer, plan.exposures.clone())?;
         trainer.remember(plan.clone());
         if let Some(checkpoint) = checkpoint {
             trainer.resume(checkpoint)?;
@@ -261,6 +260,7 @@ impl Fit<'_> {
             extent: dataset.extent,
             iterations: trainer.schedule().end,
             curve: trainer.curve().to_vec(),
+            album: self.pictures(&mut trainer),
             given_up: trainer.given_up(),
             last,
             load: trainer.load(),
@@ -270,6 +270,30 @@ impl Fit<'_> {
             plan,
             splats,
         })
+    }
+
+    /// Lets a training look at views on its way.
+    fn watch(&self, trainer: &mut LumaTrainer, exposures: Vec<Exposure>) -> Result<(), LumaError> {
+        let (photographed, views) = self.watched();
+        trainer.watch(PlannedViews::watched(
+            photographed.clone(),
+            views,
+            exposures,
+        ))?;
+        if self.album {
+            trainer.keep_album();
+        }
+        Ok(())
+    }
+
+    /// Pictures from its way.
+    fn pictures(&self, trainer: &mut LumaTrainer) -> Vec<AlbumPicture> {
+        let (_, views) = self.watched();
+        let of_dataset = |picture: AlbumPicture| AlbumPicture {
+            view: views[picture.view],
+            ..picture
+        };
+        trainer.album().into_iter().map(of_dataset).collect()
     }
 
     /// Gaussians to train, and those around them that stay.

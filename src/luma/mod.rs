@@ -46,6 +46,6 @@ pub use preset::{FLAT, Preset};
 pub use roofline::minimum_words;
 pub use schedule::Schedule;
 pub use settings::{DensifyRules, LearningRates, LumaSettings, PAPER_ITERATIONS};
-pub use trainer::{Grows, HeldOutScore, LumaProgress, LumaTrainer};
+pub use trainer::{AlbumPicture, Grows, HeldOutScore, LumaProgress, LumaTrainer};
 pub use trial::{TrialProgress, planned};
 pub use view::{TrainingView, TrainingViews};

@@ -17,7 +17,7 @@ mod scores;
 mod state;
 mod watch;
 
-pub use scores::HeldOutScore;
+pub use scores::{AlbumPicture, HeldOutScore};
 pub use state::{Grows, LumaTrainer};
 
 use std::{

@@ -15,7 +15,7 @@ use crate::{
     capture::Dataset,
     effects::{Effect, Evidence, Overrules, Plan, Trials},
     measure,
-    raster::{Raster, SceneRenderer},
+    raster::{Raster, RasterOptions, SceneRenderer, plain},
     splats::Splats,
 };
 
@@ -269,7 +269,7 @@ impl Trial<'_> {
     }
 
     /// Mean corrected PSNR of the views held back, of a training with an arm's effects and a shell
-    /// around the scene.
+    /// around the scene, as a viewer without antialiasing draws its file.
     fn psnr(
         &self,
         arm: &Arm,
@@ -290,12 +290,20 @@ impl Trial<'_> {
         });
         let extent = self.dataset.extent;
         let start = placed_splats(self.dataset, self.evidence, &settings, shell.len())?;
-        let drawn = self.raster.drawing(settings.raster_options());
-        let mut trainer =
-            LumaTrainer::new(self.raster.clone(), settings, extent, &start, trained?)?;
+        let trained = trained?;
+        let cameras = trained
+            .iter()
+            .map(|view| view.camera.clone())
+            .collect::<Vec<_>>();
+        let antialiased = settings.raster_options().antialiased;
+        let mut trainer = LumaTrainer::new(self.raster.clone(), settings, extent, &start, trained)?;
         trainer.surround(shell.clone());
         trainer.train_while(&mut |progress| observe(progress.iteration))?;
-        let splats = trainer.splats()?;
+        let mut splats = trainer.splats()?;
+        if antialiased {
+            splats = plain(&splats, &cameras, extent);
+        }
+        let drawn = self.raster.drawing(RasterOptions::default());
         let mut renderer = SceneRenderer::of(&drawn, &splats, &[&splats.sh], extent)?;
         let (mut sum, mut count) = (0.0, 0.0);
         for view in held_back? {

@@ -23,6 +23,6 @@ pub use image_error::{
     DeltaE, IDENTICAL_PSNR, ab_error, corrected_psnr, delta_e, mean_delta_e, psnr, reported_psnr,
 };
 pub use optical_flow::optical_flow;
-pub use sharpness::{laplacian, variance};
+pub use sharpness::{laplacian, lost_detail, variance};
 pub use ssim::ssim;
 pub use visibility::{MASK_RULE, visible};

@@ -7,15 +7,19 @@
 mod borders;
 mod colmap;
 mod color_tags;
+mod database;
 mod error;
 mod ffmpeg;
 mod film;
 mod frame_times;
 mod masks;
+mod motion;
 mod options;
+mod panorama;
 mod photos;
 mod poses;
 pub(crate) mod pycolmap;
+mod rotations;
 mod scan;
 mod sharp;
 mod shots;
@@ -30,6 +34,7 @@ use std::{
 use serde::Serialize;
 
 pub use error::PrepareError;
+pub use motion::{CameraMotion, Motion};
 pub use options::{Cameras, Matching, PrepareOptions};
 pub use poses::Poses;
 pub(crate) use state::{digest, of as digest_of};
@@ -67,7 +72,9 @@ pub struct Prepared {
     pub masked: usize,
     /// The COLMAP that found the poses.
     pub colmap: String,
-    /// Poses and points that COLMAP found.
+    /// The camera's motion; `None` where no photos match.
+    pub motion: Option<Motion>,
+    /// Poses and points.
     pub poses: Poses,
     /// All that is doubtful.
     pub warnings: Vec<String>,
@@ -153,9 +160,10 @@ fn make(
         cameras: cameras(options, is_film, &photos),
         lens,
         matching,
+        motion: options.camera,
         is_film,
     };
-    let poses = task.find(state, colmap, observe)?;
+    let (motion, poses) = task.find(state, colmap, observe)?;
     Ok(Prepared {
         folder: options.output.clone(),
         film: Film::read(&state.path("."))?,
@@ -163,6 +171,7 @@ fn make(
         photos: photos.headers.len(),
         masked,
         colmap: colmap.name(),
+        motion,
         poses,
         warnings: Vec::new(),
     })

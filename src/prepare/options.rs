@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use super::CameraMotion;
+
 /// Folder of the masks.
 pub(super) const MASKS: &str = "masks";
 
@@ -42,6 +44,9 @@ pub struct PrepareOptions {
     pub cameras: Option<Cameras>,
     /// COLMAP's name of the camera model.
     pub lens: String,
+    /// The camera's motion; found out from the matches.
+    #[serde(default)]
+    pub camera: Option<CameraMotion>,
     /// Pairs of photos that are matched; each frame of a film with those next to it.
     pub matching: Option<Matching>,
     /// True if `pycolmap` is installed where COLMAP is missing.

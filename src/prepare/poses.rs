@@ -10,10 +10,12 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{
-    PrepareError,
+    CameraMotion, Motion, PrepareError,
     colmap::{self, Colmap, Features},
-    masks,
+    database::Matches,
+    masks, motion,
     options::{Cameras, DATABASE, Matching, SPARSE},
+    panorama,
     photos::Photos,
     state::{OutputState, Step, digest, of},
 };
@@ -56,6 +58,8 @@ pub(super) struct Task<'a> {
     pub cameras: Cameras,
     pub lens: &'a str,
     pub matching: Matching,
+    /// The camera's motion, where it was told.
+    pub motion: Option<CameraMotion>,
     pub is_film: bool,
 }
 
@@ -69,7 +73,7 @@ impl Task<'_> {
         state: &mut OutputState,
         colmap: &Colmap,
         observe: &mut Observer<'_>,
-    ) -> Result<Poses, PrepareError> {
+    ) -> Result<(Option<Motion>, Poses), PrepareError> {
         let masks = self.masks.as_deref().map_or(Ok(String::new()), digest)?;
         let features = of(&[
             "features",
@@ -85,7 +89,10 @@ impl Task<'_> {
         };
         let matching = format!("{}{by_number}", json!(self.matching));
         let matches = of(&["matches", &features, &matching]);
-        let poses = of(&["poses", &matches]);
+        let poses = match self.motion {
+            Some(motion) => of(&["poses", &matches, &motion.to_string()]),
+            None => of(&["poses", &matches]),
+        };
         let done = [
             state.is_done(Step::Features, &features),
             state.is_done(Step::Matches, &matches),
@@ -101,10 +108,38 @@ impl Task<'_> {
         if !state.is_done(Step::Matches, &matches) {
             self.match_photos(state, colmap, &matches, observe)?;
         }
-        if !(state.is_done(Step::Poses, &poses)) {
-            self.place(state, colmap, &poses, observe)?;
+        let seen = match Matches::read(&state.path(DATABASE)) {
+            Err(error) if self.motion.is_none() => {
+                observe(Event::Warning(format!(
+                    "{error}; poses are looked for as of a camera that moves"
+                )));
+                Matches::default()
+            }
+            read => read?,
+        };
+        let found = motion::found(&seen, self.motion);
+        if let Some((motion, _)) = &found {
+            observe(Event::Note(motion.in_words()));
         }
-        self.judge(state, observe)
+        let still = found
+            .as_ref()
+            .filter(|(motion, _)| motion.camera != CameraMotion::Moves);
+        match still {
+            _ if state.is_done(Step::Poses, &poses) => {}
+            Some((_, still)) => {
+                let draft = state.draft()?;
+                let sparse = draft.path().join(SPARSE);
+                let model = sparse.join("0");
+                for folder in [&sparse, &model] {
+                    disk::make_folder(folder).map_err(files::at(folder))?;
+                }
+                panorama::write(still, &seen, &model)?;
+                state.place(Step::Poses, &poses, &[(sparse, SPARSE)])?;
+            }
+            None => self.place(state, colmap, &poses, observe)?,
+        }
+        let poses = self.judge(state, observe)?;
+        Ok((found.map(|(motion, _)| motion), poses))
     }
 
     /// Names in the order of their numbers, where photos are matched one after the other and

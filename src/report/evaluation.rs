@@ -11,14 +11,18 @@ use crate::measure::{Consistency, DENOMINATOR_RULE, MASK_RULE, SCALE_RULE};
 pub const EVALUATION_VERSION: u32 = 1;
 
 /// Method that made the pictures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+///
+/// The order is that of rows in tables.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Luma and a/b blended apart, in CIELAB.
-    Native,
+    /// The gray scene.
+    Luma,
     /// The exported file, as viewers show it.
     Exported,
+    /// Luma and a/b blended apart, in CIELAB.
+    Native,
     /// The photo's lightness with the teacher's a/b.
     Teacher,
     /// RGB splats on the same geometry, fitted to the teacher's pictures.
@@ -35,21 +39,35 @@ pub enum Method {
     PerFrame,
     /// The photo itself.
     Photo,
+    /// Another program, by the name that the user gave it.
+    #[serde(untagged)]
+    Other(String),
 }
 
 impl Method {
+    /// Another program's pictures; `None` for a name that is a method's own.
+    pub fn other(name: &str) -> Option<Self> {
+        let other = Self::Other(name.to_owned());
+        let read = serde_json::from_value(name.into()).ok();
+        (read.as_ref() == Some(&other)).then_some(other)
+    }
+
     /// Part of the names of its files.
-    pub fn file_stem(self) -> String {
-        // An enum without contents: serializing it cannot fail.
-        let name = serde_plain::to_string(&self).unwrap_or_default();
+    pub fn file_stem(&self) -> String {
+        if let Self::Other(name) = self {
+            return format!("against-{name}");
+        }
+        // A variant without contents: serializing it cannot fail.
+        let name = serde_plain::to_string(self).unwrap_or_default();
         name.replace('_', "-")
     }
 
     /// Name of its pictures, in tables and under pictures.
-    pub fn name(self) -> &'static str {
+    pub fn name(&self) -> &str {
         match self {
-            Self::Native => "ours, native",
+            Self::Luma => "luma",
             Self::Exported => "ours",
+            Self::Native => "ours, native",
             Self::Teacher => "teacher",
             Self::RgbSplats => "RGB splats",
             Self::ChromadistillPaper => "ChromaDistill, paper",
@@ -58,6 +76,7 @@ impl Method {
             Self::ChromadistillRgb => "ChromaDistill, RGB",
             Self::PerFrame => "teacher per frame",
             Self::Photo => "photo",
+            Self::Other(name) => name,
         }
     }
 }
@@ -125,6 +144,11 @@ pub struct LumaScore {
     /// `None` in files that do not know it.
     #[serde(default)]
     pub corrected_psnr: Option<f64>,
+    /// PSNR of the exported file in a viewer without antialiasing, in dB.
+    ///
+    /// Mean over the held-out views, only where the scene is antialiased.
+    #[serde(default)]
+    pub plain_psnr: Option<f64>,
     /// Structural similarity, 1 for equal pictures.
     pub ssim: f64,
     /// Variance of the Laplacian, of grays from 0 to 255.
@@ -150,10 +174,10 @@ pub struct PeerReport {
 }
 
 /// Quality of one method's colored pictures; fidelity only where photos have colors.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PictureScore {
-    /// Method of the pictures.
+    /// Method of the pictures; or a name given with `--against`.
     pub method: Method,
     /// PSNR of R, G and B together, in dB.
     pub psnr: Option<f64>,
@@ -182,7 +206,8 @@ pub struct PictureScore {
     ///
     /// Of grays from 0 to 255.
     pub sharpness: f64,
-    /// Learned perceptual distance, with `--lpips`.
+    /// Learned perceptual distance to the photo, with `--lpips`; to the teacher's picture where the
+    /// photo is gray.
     pub lpips: Option<f64>,
 }
 
@@ -234,10 +259,32 @@ pub struct PathScore {
     pub skipped: Vec<usize>,
     /// One entry a distance and method.
     pub consistency: Vec<PathConsistency>,
+    /// Frames of each method against gray ones of 8 bits, mean over the path.
+    #[serde(default)]
+    pub pictures: Vec<PictureScore>,
+    /// Objects detected in the frames of each method, with `--detector`.
+    #[serde(default)]
+    pub detections: Vec<DetectionScore>,
+}
+
+/// Objects that a detector sees in one method's frames, with scores of 0.3 or more.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct DetectionScore {
+    /// Method of the pictures.
+    pub method: Method,
+    /// Detections in a frame, mean.
+    pub per_frame: f64,
+    /// Score of a detection, mean.
+    pub score: Option<f64>,
+    /// Share of the detections with one of the same class in the next frame at the same place.
+    ///
+    /// Intersection over union of 0.5 or more; the motion between frames is not taken out.
+    pub kept: Option<f64>,
 }
 
 /// One method's consistency at one distance.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PathConsistency {
     /// Distance of the two pictures, in frames.
@@ -268,7 +315,7 @@ pub struct BetweenScore {
 }
 
 /// One method's consistency.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ConsistencyScore {
     /// Method of the pictures.
@@ -295,9 +342,9 @@ pub struct ConsistencyScore {
 
 impl ConsistencyScore {
     /// The figures of a sum.
-    pub fn new(method: Method, sum: &Consistency) -> Self {
+    pub fn new(method: &Method, sum: &Consistency) -> Self {
         Self {
-            method,
+            method: method.clone(),
             pairs: sum.pairs(),
             visible: sum.visible_share(),
             values: sum.values(),
@@ -309,8 +356,9 @@ impl ConsistencyScore {
 
     /// `equal_rms` by the colorfulness of `pictures`.
     pub fn at_equal_colorfulness(&self, pictures: &[PictureScore]) -> Option<f64> {
-        let strength = |method| Some(pictures.iter().find(|p| p.method == method)?.colorfulness);
-        let factor = strength(Method::Teacher)? / strength(self.method)?;
+        let strength =
+            |method: &Method| Some(pictures.iter().find(|p| p.method == *method)?.colorfulness);
+        let factor = strength(&Method::Teacher)? / strength(&self.method)?;
         Some(self.rms? * factor).filter(|_| factor.is_finite())
     }
 }
@@ -336,7 +384,7 @@ mod tests {
             }))
         };
         let equal = |rms, own| {
-            let mut score = ConsistencyScore::new(Method::Exported, &Consistency::default());
+            let mut score = ConsistencyScore::new(&Method::Exported, &Consistency::default());
             score.rms = Some(rms);
             let pictures = [painted("exported", own), painted("teacher", 20.0)];
             score.at_equal_colorfulness(&pictures.map(|picture| picture.expect("a score")))

@@ -1,28 +1,21 @@
-//! The tables of `eval`, with a row a method in both.
+//! The tables of `eval`, with a row a method.
+
+use std::collections::BTreeSet;
 
 use super::{
-    ConsistencyScore, Evaluation, Method,
+    ConsistencyScore, Evaluation, Method, PathConsistency,
     table::{Table, figure},
 };
 
-/// The order of the rows: the file that viewers show comes first.
-const ROWS: [Method; 10] = [
-    Method::Exported,
-    Method::Native,
-    Method::Teacher,
-    Method::RgbSplats,
-    Method::ChromadistillPaper,
-    Method::ChromadistillOneScale,
-    Method::ChromadistillCode,
-    Method::ChromadistillRgb,
-    Method::PerFrame,
-    Method::Photo,
-];
-
 impl Evaluation {
-    /// Quality and consistency as tables.
-    pub fn tables(&self) -> [Table; 2] {
-        [self.quality_table(), self.consistency_table()].map(Table::without_empty_columns)
+    /// Quality, consistency and detections as tables.
+    pub fn tables(&self) -> Vec<Table> {
+        let mut tables = vec![self.quality_table(), self.consistency_table()];
+        tables.extend(self.detection_table());
+        tables
+            .into_iter()
+            .map(Table::without_empty_columns)
+            .collect()
     }
 
     fn quality_table(&self) -> Table {
@@ -55,11 +48,7 @@ impl Evaluation {
             format!("{:.0}", self.luma.sharpness),
             figure(self.luma.lpips, 3),
         ];
-        let scores = ROWS.into_iter().flat_map(|method| {
-            let all = self.pictures.iter();
-            all.filter(move |score| score.method == method)
-        });
-        let colored = scores.map(|score| {
+        let colored = self.pictures.iter().map(|score| {
             [
                 score.method.to_string(),
                 figure(score.psnr, 2),
@@ -114,33 +103,36 @@ impl Evaluation {
     }
 
     fn consistency_table(&self) -> Table {
-        let mut deltas: Vec<usize> = self.path.consistency.iter().map(|c| c.delta).collect();
-        deltas.dedup();
-        let mut columns: Vec<(String, Vec<ConsistencyScore>)> = (deltas.into_iter())
-            .map(|delta| {
-                let at = self.path.consistency.iter().filter(|c| c.delta == delta);
-                (format!("path, Δ = {delta}"), at.map(|c| c.score).collect())
-            })
-            .collect();
+        let mut columns: Vec<(String, Vec<ConsistencyScore>)> = Vec::new();
+        for PathConsistency { delta, score } in &self.path.consistency {
+            let name = format!("path, Δ = {delta}");
+            match columns.last_mut().filter(|(last, _)| *last == name) {
+                Some((_, scores)) => scores.push(score.clone()),
+                None => columns.push((name, vec![score.clone()])),
+            }
+        }
         let between = self.between.consistency.clone();
         columns.push(("photographed views".to_owned(), between));
-        let rms = |method: Method, scores: &[ConsistencyScore]| {
-            let score = scores.iter().find(|score| score.method == method)?;
-            Some((score.rms?, score.equal_rms))
+        let cell = |found: Option<&ConsistencyScore>| {
+            let rms = found.and_then(|score| score.rms);
+            match found.and_then(|score| score.equal_rms) {
+                Some(equal) => format!("{} ({equal:.2})", figure(rms, 2)),
+                None => figure(rms, 2),
+            }
         };
-        let cell = |&found: &Option<(f64, Option<f64>)>| match found {
-            Some((rms, Some(equal))) => format!("{rms:.2} ({equal:.2})"),
-            found => figure(found.map(|(rms, _)| rms), 2),
-        };
-        let rows = ROWS.into_iter().filter_map(|method| {
-            let figures: Vec<_> = (columns.iter())
-                .map(|(_, scores)| rms(method, scores))
-                .collect();
-            let cells = figures.iter().map(cell);
-            let row = std::iter::once(method.to_string()).chain(cells).collect();
-            figures.iter().any(Option::is_some).then_some(row)
+        let rows = self.compared().into_iter().map(|method| {
+            let rms = |(_, scores): &(String, Vec<ConsistencyScore>)| {
+                cell(scores.iter().find(|score| score.method == method))
+            };
+            let frames = self.path.pictures.iter().find(|one| one.method == method);
+            let mut row = vec![method.to_string()];
+            row.extend(columns.iter().map(rms));
+            row.push(figure(frames.map(|one| one.colorfulness), 1));
+            row.push(figure(frames.map(|one| one.gray_psnr), 2));
+            row.push(figure(frames.map(|one| one.sharpness), 0));
+            row
         });
-        let rows: Vec<Vec<String>> = rows.collect();
+        let rows = rows.collect();
         let compared: Vec<String> = (columns.iter())
             .filter_map(|(name, scores)| {
                 let any = scores.first()?;
@@ -149,8 +141,7 @@ impl Evaluation {
             })
             .collect();
         let mut notes = vec![
-            "Root mean square in CIELAB units; in brackets at the teacher's colorfulness."
-                .to_owned(),
+            "Root mean square in CIELAB units, in brackets at the teacher's colorfulness; colorfulness, gray PSNR (against the gray frames in 8 bits) and sharpness are of the path's frames.".to_owned(),
             format!(
                 "Pairs of pictures, and how much of them is visible in both: {}.",
                 compared.join(", ")
@@ -178,14 +169,44 @@ impl Evaluation {
                 self.path.skipped
             ));
         }
-        let head = std::iter::once("pictures".to_owned());
+        let mut head = vec!["pictures".to_owned()];
+        head.extend(columns.into_iter().map(|(name, _)| name));
+        head.extend(["colorful", "gray PSNR", "sharp"].map(str::to_owned));
         Table {
             title: "Differences of a, b between views of one place".to_owned(),
-            head: head
-                .chain(columns.into_iter().map(|(name, _)| name))
-                .collect(),
+            head,
             rows,
             notes,
         }
+    }
+
+    /// Methods whose pictures were compared with each other.
+    pub(super) fn compared(&self) -> Vec<Method> {
+        let path = self.path.consistency.iter().map(|one| &one.score);
+        let scores = path.chain(&self.between.consistency);
+        let compared = scores.filter(|score| score.rms.is_some());
+        let methods: BTreeSet<&Method> = compared.map(|score| &score.method).collect();
+        methods.into_iter().cloned().collect()
+    }
+
+    fn detection_table(&self) -> Option<Table> {
+        let rows = self.path.detections.iter().map(|score| {
+            vec![
+                score.method.to_string(),
+                format!("{:.2}", score.per_frame),
+                figure(score.score, 2),
+                figure(score.kept, 2),
+            ]
+        });
+        let head = ["pictures", "objects a frame", "score", "kept"];
+        (!self.path.detections.is_empty()).then(|| Table {
+            title: format!("Detected objects in {} frames of the path", self.path.frames),
+            head: head.map(str::to_owned).to_vec(),
+            rows: rows.collect(),
+            notes: vec![
+                "Detections with scores of 0.3 or more; kept: share with one of the same class in the next frame, intersection over union 0.5 or more, the motion between frames not taken out."
+                    .to_owned(),
+            ],
+        })
     }
 }

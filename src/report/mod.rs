@@ -16,8 +16,8 @@ pub use chroma::{ChromaReport, ChromaSeconds, ColorError, ColorQuality, ColorVie
 pub use contact_sheet::{Row, contact_sheet, to_image, write_text};
 pub use effects::EffectReport;
 pub use evaluation::{
-    BetweenScore, ConsistencyScore, EVALUATION_VERSION, Evaluation, LumaScore, Method,
-    PathConsistency, PathScore, PeerReport, PictureScore, Rules, ViewScore,
+    BetweenScore, ConsistencyScore, DetectionScore, EVALUATION_VERSION, Evaluation, LumaScore,
+    Method, PathConsistency, PathScore, PeerReport, PictureScore, Rules, ViewScore,
 };
 pub use page::{Figure, Flight, PageRow, error_map, evaluation_page};
 pub use table::Table;
@@ -97,6 +97,9 @@ pub struct CaptureReport {
     ///
     /// Radius of the cameras as 3DGS takes it.
     pub extent: f64,
+    /// True if all photos were taken from one place, and the scene has no depth.
+    #[serde(default)]
+    pub panorama: bool,
     /// Subtracted from COLMAP's x, y and z, in world units.
     pub offset: [f64; 3],
     /// The photos, by which commands detect changes.
@@ -126,6 +129,7 @@ impl CaptureReport {
             masked_views: dataset.masked_views,
             not_finite: dataset.not_finite(),
             extent: dataset.extent,
+            panorama: capture.is_panorama(),
             offset: capture.offset.to_array(),
             photos: Vec::new(),
         }
@@ -301,6 +305,14 @@ pub struct LumaQuality {
     /// `None` in files that do not know it.
     #[serde(default)]
     pub corrected_psnr: Option<f64>,
+    /// PSNR of the exported file in a viewer without antialiasing, in dB.
+    ///
+    /// Only where the scene is antialiased.
+    #[serde(default)]
+    pub plain_psnr: Option<f64>,
+    /// Share of the photo's textured blocks that show less than 15 % of its detail.
+    #[serde(default)]
+    pub lost_detail: Option<f64>,
     /// Structural similarity, 1 for equal pictures.
     pub ssim: f64,
 }
@@ -311,12 +323,15 @@ impl LumaQuality {
         self.corrected_psnr.unwrap_or(self.psnr)
     }
 
-    /// Both kinds of PSNR, in words.
+    /// All kinds of PSNR, in words.
     pub fn psnr_in_words(&self) -> String {
         let corrected = self.corrected_psnr.map_or(String::new(), |psnr| {
             format!(" ({psnr:.2} dB after each photo's own gain and offset)")
         });
-        format!("PSNR {:.2} dB{corrected}", self.psnr)
+        let plain = self.plain_psnr.map_or(String::new(), |psnr| {
+            format!(", exported to viewers without antialiasing {psnr:.2} dB")
+        });
+        format!("PSNR {:.2} dB{corrected}{plain}", self.psnr)
     }
 }
 

@@ -36,7 +36,7 @@ for (const figure of document.querySelectorAll("[data-frames]")) {
   figure.querySelector("figcaption").before(controls);
 }
 
-// Of each view, ours to the left of a line that can be moved, another to the right of it.
+// Of each viewpoint, ours to the left of a line that can be moved, another to the right of it.
 for (const row of document.querySelectorAll(".row")) {
   const pictures = new Map();
   for (const figure of row.querySelectorAll("figure")) {
@@ -58,7 +58,8 @@ for (const row of document.querySelectorAll(".row")) {
   const choice = make("select");
   choice.setAttribute("aria-label", "what ours is compared with");
   for (const name of pictures.keys()) choice.append(make("option", { textContent: name }));
-  choice.value = pictures.has("teacher") ? "teacher" : "photo";
+  const first = ["teacher", "photo"].find((name) => pictures.has(name));
+  choice.value = first ?? [...pictures.keys()].pop();
   const choose = () => { under.src = source(pictures.get(choice.value)); };
   choice.addEventListener("change", choose);
   choose();

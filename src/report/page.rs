@@ -28,9 +28,9 @@ pub struct Figure {
     pub file: String,
 }
 
-/// A view's pictures.
+/// Pictures of one viewpoint.
 pub struct PageRow {
-    /// The photo's name.
+    /// The photo's name, or the frame's.
     pub name: String,
     /// Left to right.
     pub figures: Vec<Figure>,
@@ -62,19 +62,15 @@ pub struct Flight {
     pub film: Option<String>,
     /// Bytes of the film; of all frames where there is none.
     pub bytes: u64,
+    /// Some of its frames.
+    pub rows: Vec<PageRow>,
 }
 
 /// Script of the page.
 const SCRIPT: &str = include_str!("page.js");
 
-/// The page's HTML: a verdict, tables, the path, and a row of pictures a view. `strip` are some
-/// of the path's frames.
-pub fn evaluation_page(
-    evaluation: &Evaluation,
-    rows: &[PageRow],
-    flight: &Flight,
-    strip: &[String],
-) -> String {
+/// The page's HTML: a verdict, tables, the path, and a row of pictures a view.
+pub fn evaluation_page(evaluation: &Evaluation, flight: &Flight, views: &[PageRow]) -> String {
     let mut html = head("gs-chroma evaluation");
     // Writing to a string cannot fail.
     let _ = write!(
@@ -93,15 +89,8 @@ pub fn evaluation_page(
     }
     html.push_str("<h2>Along the path</h2>\n");
     push_flight(&mut html, flight);
-    html.push_str("<div class=\"strip\">\n");
-    for file in strip {
-        let _ = writeln!(
-            html,
-            "<a href=\"{0}\"><img src=\"{0}\" alt=\"{0}\" loading=\"lazy\"></a>",
-            escaped(file)
-        );
-    }
-    html.push_str("</div>\n<h2>View by view</h2>\n");
+    push_rows(&mut html, &flight.rows);
+    html.push_str("<h2>View by view</h2>\n");
     let _ = writeln!(
         html,
         "<p class=\"note\">A picture opens large. Maps of errors: <span class=\"ramp\" style=\"background:linear-gradient(90deg,{})\"></span> from 0 to {MAP_END:.0} and beyond, in ΔE00 or CIELAB units.</p>",
@@ -111,6 +100,14 @@ pub fn evaluation_page(
         })
         .join(",")
     );
+    push_rows(&mut html, views);
+    let _ = write!(html, "<script>\n{SCRIPT}</script>\n");
+    html.push_str(TAIL);
+    html
+}
+
+/// Viewpoints, each with its name and its pictures side by side.
+fn push_rows(html: &mut String, rows: &[PageRow]) {
     for row in rows {
         let _ = writeln!(html, "<h3>{}</h3>\n<div class=\"row\">", escaped(&row.name));
         for figure in &row.figures {
@@ -123,9 +120,6 @@ pub fn evaluation_page(
         }
         html.push_str("</div>\n");
     }
-    let _ = write!(html, "<script>\n{SCRIPT}</script>\n");
-    html.push_str(TAIL);
-    html
 }
 
 /// The path as a film, or its first frame, from which the script goes on.

@@ -18,26 +18,21 @@ const FAINT: f64 = 2.0;
 impl Evaluation {
     /// Verdict, a line each. docs/guide.md has the bounds.
     pub fn verdict(&self) -> Vec<String> {
-        [
-            self.agreement(Method::Teacher, "the teacher's own pictures"),
-            self.agreement(Method::PerFrame, "the teacher frame by frame"),
-        ]
-        .into_iter()
-        .chain(self.peers.iter().map(|peer| self.recipe(peer.method)))
-        .chain([
+        let others = self.compared().into_iter();
+        let agreement = others.filter_map(|other| self.agreement(&other));
+        let rest = [
             self.strength(),
             self.truth(),
             self.export(),
             Some(self.gray()),
-        ])
-        .flatten()
-        .collect()
+        ];
+        agreement.chain(rest.into_iter().flatten()).collect()
     }
 
     /// Agreement at equal colorfulness and a/b error, compared with another way to color.
-    fn recipe(&self, other: Method) -> Option<String> {
-        let compared = |of: &dyn Fn(Method) -> Option<f64>, what: &str| {
-            let (ours, theirs) = (of(Method::Exported)?, of(other)?);
+    fn recipe(&self, other: &Method) -> Option<String> {
+        let compared = |of: &dyn Fn(&Method) -> Option<f64>, what: &str| {
+            let (ours, theirs) = (of(&Method::Exported)?, of(other)?);
             let ended = match ours / theirs {
                 ratio if ratio < LEVEL[0] => "a win",
                 ratio if ratio <= LEVEL[1] => "level",
@@ -45,31 +40,62 @@ impl Evaluation {
             };
             Some(format!("{what} {ours:.2} against {theirs:.2}, {ended}"))
         };
-        let differ = |method| self.consistency(method)?.equal_rms;
-        let miss = |method| self.picture(method)?.ab_error;
+        let differ = |method: &Method| self.consistency(method)?.equal_rms;
+        let miss = |method: &Method| self.picture(method)?.ab_error;
         let agreement = compared(&differ, "views differ at equal colorfulness by")?;
         let error = compared(&miss, "; colors miss the photos' by").unwrap_or_default();
         Some(format!("beside {other}: {agreement}{error} (CIELAB units)"))
     }
 
-    fn picture(&self, method: Method) -> Option<&PictureScore> {
-        self.pictures.iter().find(|score| score.method == method)
+    fn picture(&self, method: &Method) -> Option<&PictureScore> {
+        self.pictures.iter().find(|score| score.method == *method)
     }
 
     /// Difference between photographed views of one place.
-    fn consistency(&self, method: Method) -> Option<&ConsistencyScore> {
+    fn consistency(&self, method: &Method) -> Option<&ConsistencyScore> {
         let mut scores = self.between.consistency.iter();
-        scores.find(|score| score.method == method)
+        scores.find(|score| score.method == *method)
     }
 
-    /// Agreement between views, compared with another method's.
-    fn agreement(&self, other: Method, name: &str) -> Option<String> {
-        let rms = |method| self.consistency(method)?.rms;
-        let (ours, theirs) = (rms(Method::Exported)?, rms(other)?);
-        let figures = format!("({ours:.2} against {theirs:.2} CIELAB units)");
+    /// Agreement between photographed views, or frames where a method has nothing else, compared
+    /// with ours.
+    fn agreement(&self, other: &Method) -> Option<String> {
+        if self.peers.iter().any(|peer| peer.method == *other) {
+            return self.recipe(other);
+        }
+        let name = match other {
+            Method::Exported | Method::Native | Method::Photo => return None,
+            Method::Teacher => "the teacher's own pictures",
+            Method::PerFrame => "the teacher frame by frame",
+            other => other.name(),
+        };
+        let views: Vec<&ConsistencyScore> = self.between.consistency.iter().collect();
+        // Frames that are farthest apart come first.
+        let path = self.path.consistency.iter().rev();
+        let frames: Vec<&ConsistencyScore> = path.map(|one| &one.score).collect();
+        let both = |scores: &[&ConsistencyScore]| {
+            let rms = |method: &Method| {
+                let mut own = scores.iter().filter(|score| score.method == *method);
+                own.find_map(|score| score.rms)
+            };
+            Some([rms(&Method::Exported)?, rms(other)?])
+        };
+        let (what, [ours, theirs]) = match both(&views) {
+            Some(figures) => ("views", figures),
+            None => ("frames of the path", both(&frames)?),
+        };
+        let colorful = |method: &Method| {
+            let mut pictures = self.path.pictures.iter();
+            Some(pictures.find(|score| score.method == *method)?.colorfulness)
+        };
+        let strength = match (colorful(&Method::Exported), colorful(other)) {
+            (Some(ours), Some(theirs)) => format!("; colorfulness {ours:.1} against {theirs:.1}"),
+            _ => String::new(),
+        };
+        let figures = format!("({ours:.2} against {theirs:.2} CIELAB units{strength})");
         // What rounds to nothing is nothing.
         let ratio = theirs.max(0.01) / ours.max(0.01);
-        Some(format!("views agree {} {name} {figures}", times(ratio)))
+        Some(format!("{what} agree {} {name} {figures}", times(ratio)))
     }
 
     /// Colorfulness over all photos, compared with the teacher's.
@@ -92,8 +118,8 @@ impl Evaluation {
     /// Color error, ΔE00 to the photos, where these are in color.
     fn truth(&self) -> Option<String> {
         let of = |method| Some(self.picture(method)?.delta_e?.mean);
-        let ours = of(Method::Exported)?;
-        let Some(theirs) = of(Method::Teacher) else {
+        let ours = of(&Method::Exported)?;
+        let Some(theirs) = of(&Method::Teacher) else {
             return Some(format!("colors miss the photos' by ΔE00 {ours:.1}"));
         };
         let ratio = ours / theirs;
@@ -135,8 +161,11 @@ impl Evaluation {
         let corrected = luma.corrected_psnr.map_or(String::new(), |psnr| {
             format!(" ({psnr:.1} dB after each photo's own gain and offset)")
         });
+        let plain = luma.plain_psnr.map_or(String::new(), |psnr| {
+            format!("; the exported file, in viewers without antialiasing, with {psnr:.1} dB")
+        });
         format!(
-            "the gray scene shows {which} with {:.1} dB{corrected}{sharp}",
+            "the gray scene shows {which} with {:.1} dB{corrected}{sharp}{plain}",
             luma.psnr
         )
     }

@@ -7,22 +7,29 @@ use std::{
     time::Instant,
 };
 
-use super::{RunError, flight::FlightOutput, teach::teacher_or_photos};
+use super::{
+    RunError,
+    against::Against,
+    flight::{FlightOutput, page_row},
+    teach::teacher_or_photos,
+};
 use crate::{
-    capture::{Dataset, Orientation, View},
+    capture::{Dataset, View},
     chroma::teacher::{Teacher, TeacherSettings},
+    disk::trust::Originals,
     eval::{
-        ColoredScene, EvalError, Lpips, MeasuredTeacher, Painter, Peer, Progress, Scored,
-        along_path, between_views, exposures, mean_bake, mean_luma, mean_pictures, strengths,
+        ColoredScene, Detector, EvalError, Lpips, MeasuredTeacher, Painter, Peer, Progress, Scored,
+        Source, between_views, exposures, mean_bake, mean_luma, mean_pictures, mean_quality,
+        measure_luma, path_of, strengths,
     },
     gpu::Gpu,
     raster::Raster,
     report::{
-        EVALUATION_VERSION, Evaluation, Figure, Method, PageRow, PeerReport, Report, Rules,
-        TeacherReport, evaluation_page, to_image,
+        EVALUATION_VERSION, Evaluation, LumaScore, Method, PageRow, PeerReport, Report, Rules,
+        TeacherReport, evaluation_page,
     },
     splats::{ShField, Splats, is_splat_file, write_splats},
-    store::{RunFolder, StoreError, commit::Commit, files},
+    store::{RunFolder, StoreError, commit::Commit, files, originals::OriginalFiles},
     subject::{
         LockMode, Run,
         scene::{Frame, read_splats, written_as},
@@ -33,9 +40,6 @@ use crate::{
 
 /// Views on the page: a browser should not have to load a thousand pictures.
 const MAX_ROWS: usize = 24;
-
-/// Frames in the page's strip.
-const STRIP_FRAMES: usize = 12;
 
 #[derive(Clone, Debug, Default)]
 pub struct EvalOptions {
@@ -58,6 +62,12 @@ pub struct EvalOptions {
     pub flow: Option<PathBuf>,
     /// LPIPS network: perceptual distance of two images.
     pub lpips: Option<PathBuf>,
+    /// Detector of objects in the path's frames.
+    pub detector: Option<PathBuf>,
+    /// Names and results of other programs: splat files, and folders of the path's frames.
+    pub against: Vec<(String, PathBuf)>,
+    /// Folder for the path's frames in gray.
+    pub gray_frames: Option<PathBuf>,
 }
 
 /// Measures a run and writes `eval.json` and the page into its folder.
@@ -78,50 +88,55 @@ pub fn eval(
     let (folder, report) = (&run.folder, &run.report);
     observe(Event::begins(Stage::Model));
     let scene = load(&run, options, observe)?;
+    let _kept = keep(options, &scene, report);
     files::check_page(&folder.evaluation_page())?;
     let commit = Commit::new(folder.path())?;
     let page = &commit.place(&folder.evaluation_page());
     files::make_folder(page)?;
+    if let Some(folder) = &options.gray_frames {
+        files::make_pictures_folder(folder)?;
+    }
+    let cameras = path_of(&scene, options.frames);
+    let against = Against::open_all(&options.against, &scene.dataset, &cameras, observe)?;
     let mut lpips = options.lpips.as_deref().map(Lpips::open).transpose()?;
+    let detector = options.detector.as_deref().map(Detector::open);
+    let detector = detector.transpose()?;
     let mut teacher = ask(options, &run, &scene, observe)?;
     observe(Event::begins(Stage::Device));
-    let raster = report.luma.settings.raster(&Gpu::open()?);
+    let gpu = Gpu::open()?;
+    let raster = report.luma.settings.raster(&gpu);
     let peers = match &teacher {
         Some(teacher) => paint(options, &raster, (&scene, teacher), report, page, observe)?,
         None => Vec::new(),
     };
-    let mut rgb = vec![(Method::Exported, &scene.exported)];
-    rgb.extend(peers.iter().map(|(field, told)| (told.method, field)));
-    let mut painter = Painter::new(&raster, &scene, &rgb, teacher.as_mut())?;
+    let mut sources = vec![(Method::Exported, Source::Field(&scene.exported))];
+    sources.extend((scene.chroma.iter()).map(|field| (Method::Native, Source::Field(field))));
+    sources.extend((peers.iter()).map(|(field, told)| (told.method.clone(), Source::Field(field))));
+    for (method, other) in &against {
+        let source = other.source(&gpu, &scene.dataset, observe)?;
+        sources.push((method.clone(), source));
+    }
+    let mut painter = Painter::new(&raster, &scene, sources, teacher.as_mut())?;
 
     let (views, rows) = measure(&scene, &mut painter, lpips.as_mut(), page, observe)?;
-    let mut strip = Vec::new();
-    let every = options.frames.div_ceil(STRIP_FRAMES);
+    let output = FlightOutput::begin(page, options.gray_frames.as_deref(), cameras.len());
     let flow = options.flow.as_deref();
-    let mut filmed = FlightOutput::begin(page);
-    let mut keep = |frame, image| {
-        let file = format!("frame-{frame:04}.png");
-        files::write_png(&page.join(&file), &image)?;
-        filmed.add(&file, &image);
-        if frame % every == 0 {
-            strip.push(file);
-        }
-        Ok::<_, RunError>(())
-    };
+    let (mut path, flight) = output.draw(&mut painter, &cameras, flow, detector, observe)?;
     let mut told = |progress: Progress<'_>| observe(Event::from(progress));
-    let frames = options.frames;
-    let mut path = along_path(&mut painter, &scene, frames, flow, &mut told, &mut keep)?;
     let mut between = between_views(&mut painter, &scene, &mut told)?;
     let [colorfulness, teacher_colorfulness] = strengths(&mut painter, &scene, &mut told)?;
-    if !path.skipped.is_empty() {
-        observe(Event::Warning(format!(
-            "a path of {} frames is too short for Δ = {:?}: choose more",
-            path.frames, path.skipped
-        )));
-    }
+    let plain_psnr = match report.luma.settings.antialiased {
+        true => mean_quality(&measure_luma(
+            &raster,
+            &scene.dataset,
+            &scene.luma,
+            &mut told,
+        )?),
+        false => None,
+    };
+    let plain_psnr = plain_psnr.and_then(|quality| quality.plain_psnr);
     observe(Event::begins(Stage::Page));
-    let flight = filmed.end(page, &path, observe);
-    let pictures = mean_pictures(&views);
+    let pictures = mean_pictures(views.iter().flat_map(|view| &view.score.pictures));
     let of_path = path.consistency.iter_mut().map(|entry| &mut entry.score);
     for score in of_path.chain(&mut between.consistency) {
         score.equal_rms = score.at_equal_colorfulness(&pictures);
@@ -134,7 +149,10 @@ pub fn eval(
         teacher_colorfulness,
         colorfulness,
         measured_on: scene.dataset.measured().0.to_owned(),
-        luma: mean_luma(&views),
+        luma: LumaScore {
+            plain_psnr,
+            ..mean_luma(&views)
+        },
         bake: mean_bake(&views),
         pictures,
         views: views.into_iter().map(|scored| scored.score).collect(),
@@ -145,12 +163,20 @@ pub fn eval(
         between,
         seconds: begun.elapsed().as_secs_f64(),
     };
-    let html = evaluation_page(&evaluation, &rows, &flight, &strip);
+    let html = evaluation_page(&evaluation, &flight, &rows);
     files::write(&page.join(files::PAGE), html.as_bytes())?;
     let json = evaluation.to_json() + "\n";
     files::write(&commit.place(&folder.evaluation()), json.as_bytes())?;
     commit.finish()?;
     Ok((run.folder, evaluation))
+}
+
+/// Keeps photos and what others have made from being written over.
+fn keep(options: &EvalOptions, scene: &ColoredScene, report: &Report) -> Originals {
+    let others = options.against.iter().map(|(_, path)| path);
+    let kept = OriginalFiles::default().with_all(others, "a file that is measured");
+    let (root, masks) = (&scene.dataset.capture.root, &report.capture.load.masks);
+    kept.with_capture(root, Some(masks)).keep()
 }
 
 /// Colors the scene in other ways, and writes these scenes beside the page.
@@ -217,7 +243,15 @@ fn measure(
         let lpips = lpips.as_deref_mut();
         let scored = Scored::of(name, reference, &drawing, answer.as_ref(), lpips)?;
         if rows.len() < MAX_ROWS {
-            rows.push(page_row(page, rows.len(), &scored, stance.upright)?);
+            let file = format!("view-{:02}", rows.len());
+            let row = page_row(
+                page,
+                [name, &file],
+                scored.size,
+                &scored.shots,
+                stance.upright,
+            )?;
+            rows.push(row);
         }
         views.push(scored);
         Ok::<_, RunError>(())
@@ -299,7 +333,8 @@ fn ask(
             "the run was colored by another teacher than the one it is measured against".to_owned(),
         ));
     }
-    let frames = match options.baselines && teacher.is_network() {
+    let frames = options.baselines || options.detector.is_some();
+    let frames = match frames && teacher.is_network() {
         true => Some(Teacher::open(&path, None, settings)?),
         false => None,
     };
@@ -327,28 +362,4 @@ fn covers_nothing(options: &EvalOptions, dataset: &Dataset) -> impl FnOnce(EvalE
         },
         other => other.into(),
     }
-}
-
-/// Writes a view's pictures beside the page, upright.
-fn page_row(
-    folder: &Path,
-    index: usize,
-    scored: &Scored,
-    upright: Orientation,
-) -> Result<PageRow, RunError> {
-    let [width, height] = scored.size;
-    let mut figures = Vec::new();
-    for shot in &scored.shots {
-        let file = format!("view-{index:02}-{}.png", shot.file);
-        let image = to_image(width, height, &shot.pixels).into();
-        files::write_png(&folder.join(&file), &upright.image(image).into_rgb8())?;
-        figures.push(Figure {
-            caption: shot.caption.to_owned(),
-            file,
-        });
-    }
-    Ok(PageRow {
-        name: scored.score.name.clone(),
-        figures,
-    })
 }

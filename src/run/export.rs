@@ -12,7 +12,7 @@ use super::{
     loss::{Views, loss},
 };
 use crate::{
-    raster::RasterOptions,
+    raster::{RasterOptions, plain},
     splats::{Splats, WriteOptions, write_splats},
     store::{files, originals::OriginalFiles},
     subject::{LockMode, Opened, Scene, scene::written_as},
@@ -38,6 +38,8 @@ pub struct ExportOptions {
     pub clean: bool,
     /// Viewer to fit the scene for; `None` writes it unchanged.
     pub viewer: Option<ViewerChoice>,
+    /// True if an antialiased scene is written for viewers that antialias.
+    pub antialiased: bool,
     /// COLMAP folder with the cameras that it is cleaned and fitted before, where it is not the
     /// one that `fit` noted.
     pub colmap: Option<PathBuf>,
@@ -85,6 +87,15 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
     let opened = Opened::find(options.run.as_deref(), LockMode::Free)?;
     let _kept = opened.keep(OriginalFiles::default()).keep();
     let mut scene = opened.read(options.luma, None, observe)?;
+    if opened
+        .report()
+        .is_some_and(|report| report.capture.panorama)
+    {
+        observe(Event::Note(
+            "the scene is a panorama without depth: it is right from its camera's place only"
+                .to_owned(),
+        ));
+    }
     files::make_folder_of(output)?;
     let before = &Cameras {
         opened: &opened,
@@ -103,6 +114,8 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
         (scene.splats, shown) = fitted(choice, (&scene.splats, drawn), before, observe)?;
         // As these viewers draw it.
         scene.drawn = RasterOptions::default();
+    } else if scene.drawn.antialiased && !options.antialiased && opened.report().is_some() {
+        plainly(&mut scene, before, observe);
     }
     let written = written(&scene, options)?;
 
@@ -130,6 +143,20 @@ pub fn export(options: &ExportOptions, observe: &mut Observer<'_>) -> Result<Exp
         shown,
         warnings: warnings.take(),
     })
+}
+
+/// Gives an antialiased scene opacities for viewers without antialiasing, where the cameras are
+/// known.
+fn plainly(scene: &mut Scene, before: &Cameras<'_>, observe: &mut Observer<'_>) {
+    match before.open(usize::MAX, u32::MAX) {
+        Ok((train, _, extent)) => {
+            scene.splats = plain(&scene.splats, &train, extent);
+            scene.drawn = RasterOptions::default();
+        }
+        Err(_) => observe(Event::Warning(
+            "the scene is written to be drawn antialiased, since its cameras are not known: most viewers will draw it too bold".to_owned(),
+        )),
+    }
 }
 
 /// Coordinates that the scene is written in.

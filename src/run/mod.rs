@@ -1,5 +1,6 @@
 //! Whole runs: what a command does from its options to its files.
 
+mod against;
 mod answers;
 mod colorize;
 mod eval;
@@ -127,6 +128,9 @@ pub enum RunError {
         /// One with a pose.
         example: String,
     },
+    /// A name that something else has that is measured.
+    #[error("{0}: names something else that is measured: choose another name")]
+    NameTaken(String),
     /// There are hints, but no paint.
     #[error("{}: nothing is painted on any photo: paint on one", .0.display())]
     NothingPainted(PathBuf),

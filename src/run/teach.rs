@@ -220,7 +220,8 @@ impl Teachers {
                 .map(member)
                 .collect::<Result<_, RunError>>()?,
             asked_of_networks: options.settings.profile.is_some()
-                || options.settings.size.is_some(),
+                || options.settings.size.is_some()
+                || options.settings.class.is_some(),
             strength: options.strength,
             hints: hints.transpose()?,
             grow_hints: options.grow_hints,

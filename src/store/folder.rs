@@ -129,6 +129,11 @@ impl RunFolder {
         self.0.join("contact-sheet.png")
     }
 
+    /// Picture of a view after so many iterations, where these are kept.
+    pub fn album(&self, iteration: usize) -> PathBuf {
+        self.0.join("album").join(format!("{iteration}.png"))
+    }
+
     /// Makes the folder, see [`files::make_own_folder`].
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 use std::{
     env, io,
     path::Path,
-    process::{Child, Command, Stdio},
+    process::{Command, ExitStatus, Stdio},
     thread,
     time::{Duration, Instant},
 };
@@ -37,21 +37,7 @@ pub fn end_with_parent() {
 /// # Errors
 /// The last line that it said and, unless it ended by itself, how it did.
 pub(super) fn run(arguments: &[String], log: &Path, tell: &mut dyn FnMut()) -> Result<(), String> {
-    let program = env::current_exe().map_err(|error| error.to_string())?;
-    let stderr = disk::open_in_place(log).and_then(|log| log.set_len(0).map(|()| log));
-    let stderr = stderr.map_err(|error| format!("{}: {error}", log.display()))?;
-    let child = Command::new(program)
-        .args(arguments)
-        .env(TETHER, "1")
-        // A fault of a test is this program's own.
-        .env_remove(disk::FAULT)
-        // Kept open until the child is done.
-        .stdin(Stdio::piped())
-        .stdout(Stdio::null())
-        .stderr(stderr)
-        .spawn()
-        .map_err(|error| error.to_string())?;
-    let status = wait(child, tell).map_err(|error| error.to_string())?;
+    let status = ended(arguments, log, tell).map_err(|error| error.to_string())?;
     if status.success() {
         return Ok(());
     }
@@ -65,10 +51,21 @@ pub(super) fn run(arguments: &[String], log: &Path, tell: &mut dyn FnMut()) -> R
     })
 }
 
-fn wait(mut child: Child, tell: &mut dyn FnMut()) -> io::Result<std::process::ExitStatus> {
+fn ended(arguments: &[String], log: &Path, tell: &mut dyn FnMut()) -> io::Result<ExitStatus> {
+    let stderr = disk::open_in_place(log)?;
+    stderr.set_len(0)?;
+    let mut child = Command::new(env::current_exe()?)
+        .args(arguments)
+        .env(TETHER, "1")
+        // A fault of a test is this program's own.
+        .env_remove(disk::FAULT)
+        // Kept open until the child is done, which `Child::wait` would not do.
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(stderr)
+        .spawn()?;
     let mut told = Instant::now();
     loop {
-        // Not `Child::wait`, which would close the child's standard input.
         if let Some(status) = child.try_wait()? {
             return Ok(status);
         }

@@ -1,8 +1,6 @@
 //! Points and sweeps for tests.
 
-use super::sweep::{
-    Outcome, Phase, PointStage, Setting, Subject, SweepPoint, TRADEOFF_VERSION, Tradeoff,
-};
+use super::sweep::{Outcome, PointStage, Setting, Subject, SweepPoint, TRADEOFF_VERSION, Tradeoff};
 
 pub(super) fn sweep(points: Vec<SweepPoint>) -> Tradeoff {
     Tradeoff {
@@ -14,7 +12,7 @@ pub(super) fn sweep(points: Vec<SweepPoint>) -> Tradeoff {
             options: vec!["--channel".to_owned(), "r".to_owned()],
         },
         device: None,
-        budget: 60.0,
+        budget: Some(60.0),
         points,
     }
 }
@@ -23,8 +21,9 @@ pub(super) fn failed(name: &str, reason: &str) -> SweepPoint {
     SweepPoint {
         name: name.to_owned(),
         stage: PointStage::Luma,
-        phase: Phase::One,
         settings: Vec::new(),
+        after: None,
+        picture: None,
         commands: Vec::new(),
         took: 1.0,
         failed: Some(reason.to_owned()),
@@ -37,9 +36,7 @@ pub(super) fn luma(name: &str, seconds: f64, psnr: f64) -> SweepPoint {
         knob: knob.to_owned(),
         value: value.to_owned(),
     };
-    let base = name == "base";
     SweepPoint {
-        phase: if base { Phase::Base } else { Phase::One },
         settings: name.rsplit_once('-').map(setting).into_iter().collect(),
         took: seconds,
         failed: None,

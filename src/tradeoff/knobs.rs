@@ -1,42 +1,60 @@
 //! Knobs of a sweep, and their range around the base.
 
 use super::sweep::{PointStage, Setting};
-use crate::{
-    report::{ChromaReport, Report},
-    run::Preset,
-};
+use crate::report::{ChromaReport, Report};
 
-/// Share of an iteration of stage 1 that goes by pixels and not by Gaussians: about half.
-const PIXELS_SHARE: f64 = 0.5;
+/// Smaller photos, on which signs are found first, have half the side and a quarter of the
+/// Gaussians, but no fewer pixels along a side than this.
+const SMALL_SIDE: f64 = 100.0;
 
-/// Least side in pixels that `fit` accepts.
-const LEAST_SIDE: u32 = 16;
+/// Their knobs.
+const MAX_SIDE: &str = "max-side";
+const MAX_SPLATS: &str = "max-splats";
 
-/// The knob that turns many at once, and is not turned with others.
-pub(super) const PRESET: &str = "preset";
-
-/// An option of `fit` or `colorize` that trades quality for time.
+/// An option of `fit` or `colorize` that trades quality for time by a count of something.
 pub(super) struct Knob {
     /// Name in tables and for `--knobs`.
     pub name: &'static str,
     /// The stage whose time and quality it changes.
     pub stage: PointStage,
-    pub option: &'static str,
-    /// Values to try, nearest to the base first.
-    values: fn(&Base) -> Vec<String>,
-    /// Time with a value over the base's, as long as nothing was measured.
-    time: fn(&Base, &str) -> f64,
+    option: &'static str,
+    /// The base's count; 0 without.
+    count: fn(&Base) -> f64,
+    /// Least and largest count.
+    range: fn(&Base) -> [f64; 2],
+    /// Counts to try over the base's. Fewer iterations are on the base's curve.
+    factors: &'static [f64],
+    /// What the option's value is less than the count.
+    less: f64,
+    /// Power of the count that the work goes by: 2 for a picture's side.
+    power: f64,
+    /// Share of the stage's time that goes by this work.
+    share: f64,
+    /// Range of what twice the work changed, in dB of luma's error or of that between views
+    /// (docs/lab/04-presets.md#what-a-point-tells).
+    pub spread: f64,
 }
 
 /// A value of a knob.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(super) struct Value {
-    /// The stage it belongs to.
-    pub stage: PointStage,
-    /// As a point has it.
-    pub setting: Setting,
-    /// Time with it over the base's, as long as nothing was measured.
-    pub time: f64,
+    pub knob: &'static Knob,
+    /// As a point has them.
+    pub settings: Vec<Setting>,
+    /// True if it is compared with the base's settings on smaller photos.
+    pub small: bool,
+    /// How many times the work doubles from what it is compared with.
+    pub doublings: f64,
+}
+
+impl Value {
+    /// Expected time over that of what it is compared with.
+    pub fn time(&self) -> f64 {
+        let time = 1.0 - self.knob.share + self.knob.share * self.doublings.exp2();
+        // Smaller photos have as much fewer Gaussians.
+        let both = self.settings.len() > 1 && !self.small;
+        if both { time * time } else { time }
+    }
 }
 
 /// The base, around which knobs are turned.
@@ -50,157 +68,174 @@ pub(super) struct Base {
 impl Base {
     /// Longer side at which photos are seen, in pixels.
     pub fn side(&self) -> u32 {
-        self.seen(self.report.capture.load.max_side)
+        let limit = self.report.capture.load.max_side;
+        limit.map_or(self.largest_side, |side| side.min(self.largest_side))
     }
 
-    fn seen(&self, max_side: Option<u32>) -> u32 {
-        max_side.map_or(self.largest_side, |side| side.min(self.largest_side))
+    /// Most Gaussians that make a difference: a cap that is not reached does nothing when it is
+    /// raised.
+    fn most_splats(&self) -> f64 {
+        let luma = &self.report.luma;
+        let reached = luma.splats as f64 > 0.9 * luma.settings.max_splats as f64;
+        if reached {
+            f64::MAX
+        } else {
+            luma.splats as f64
+        }
     }
 
-    /// Work of another preset over that of the base, where the base leaves it to its own.
-    fn work(&self, other: Preset) -> f64 {
-        let own = self.report.preset;
-        let asked = self.report.luma.settings.iterations;
-        let iterations = match own.settings().iterations == asked {
-            true => other.settings().iterations as f64 / asked as f64,
-            false => 1.0,
-        };
-        let side = match self.report.capture.load.max_side == own.max_side() {
-            true => f64::from(self.seen(other.max_side())) / f64::from(self.side()),
-            false => 1.0,
-        };
-        iterations * side.powi(2)
-    }
-
-    fn color(&self, values: impl Fn(&ChromaReport) -> Vec<String>) -> Vec<String> {
-        self.report.chroma.as_ref().map_or(Vec::new(), values)
+    fn color(&self, count: impl Fn(&ChromaReport) -> Option<f64>) -> f64 {
+        self.report.chroma.as_ref().and_then(count).unwrap_or(0.0)
     }
 }
 
+/// What most knobs have in common.
+const PLAIN: Knob = Knob {
+    name: "",
+    stage: PointStage::Luma,
+    option: "",
+    count: |_| 0.0,
+    range: |_| [1.0, f64::MAX],
+    factors: &[],
+    less: 0.0,
+    power: 1.0,
+    share: 0.0,
+    spread: 0.0,
+};
+
+/// Harmonics up to a degree are counted along a side of their square.
+const DEGREES: fn(&Base) -> [f64; 2] = |_| [1.0, 4.0];
+
 /// The knobs of both stages.
-pub(super) const KNOBS: [Knob; 8] = [
+pub(super) static KNOBS: [Knob; 6] = [
     Knob {
         name: "iterations",
-        stage: PointStage::Luma,
         option: "--iterations",
-        values: |base| scaled(base.report.luma.iterations, &[0.5, 2.0, 0.25]),
-        time: |base, value| number(value) / base.report.luma.iterations as f64,
+        count: |base| base.report.luma.iterations as f64,
+        factors: &[2.0, 4.0],
+        share: 1.0,
+        spread: 2.2,
+        ..PLAIN
     },
     Knob {
-        name: PRESET,
-        stage: PointStage::Luma,
-        option: "--preset",
-        values: |base| {
-            let others = Preset::ALL.into_iter();
-            let others = others.filter(|preset| *preset != base.report.preset);
-            others.map(|preset| preset.to_string()).collect()
-        },
-        time: |base, value| {
-            let preset = Preset::ALL
-                .into_iter()
-                .find(|other| other.to_string() == value);
-            preset.map_or(1.0, |preset| base.work(preset))
-        },
-    },
-    Knob {
-        name: "max-side",
-        stage: PointStage::Luma,
+        name: MAX_SIDE,
         option: "--max-side",
-        values: |base| {
-            let sides = f64::from(LEAST_SIDE)..=f64::from(base.largest_side);
-            let scaled = scaled(base.side() as usize, &[0.75, 1.5, 0.5]).into_iter();
-            scaled
-                .filter(|side| sides.contains(&number(side)))
-                .collect()
-        },
-        time: |base, value| {
-            let side = number(value) / f64::from(base.side());
-            1.0 - PIXELS_SHARE + PIXELS_SHARE * side.powi(2)
-        },
+        count: |base| f64::from(base.side()),
+        // No less than `fit` accepts.
+        range: |base| [16.0, f64::from(base.largest_side)],
+        factors: &[0.75, 1.5, 0.5],
+        power: 2.0,
+        share: 0.5,
+        spread: 2.5,
+        ..PLAIN
     },
     Knob {
-        name: "max-splats",
-        stage: PointStage::Luma,
+        name: MAX_SPLATS,
         option: "--max-splats",
-        values: |base| {
-            let luma = &base.report.luma;
-            let cap = luma.settings.max_splats;
-            let mut values = scaled(luma.splats.min(cap), &[0.5, 0.25]);
-            // A cap that is not reached does nothing when it is raised.
-            if luma.splats as f64 > 0.9 * cap as f64 {
-                values.extend(scaled(cap, &[2.0]));
-            }
-            values
-        },
-        time: |base, value| {
-            let splats = number(value) / base.report.luma.splats.max(1) as f64;
-            PIXELS_SHARE + (1.0 - PIXELS_SHARE) * splats
-        },
-    },
-    Knob {
-        name: "sh-degree",
-        stage: PointStage::Luma,
-        option: "--sh-degree",
-        values: |base| {
-            let own = base.report.luma.settings.sh_degree;
-            let others = (0..=3).filter(|degree| *degree != own);
-            others.map(|degree: u32| degree.to_string()).collect()
-        },
-        time: |base, value| {
-            let cost = |degree: f64| 1.0 + 0.05 * (degree + 1.0).powi(2);
-            cost(number(value)) / cost(f64::from(base.report.luma.settings.sh_degree))
-        },
+        count: |base| base.report.luma.splats as f64,
+        range: |base| [1.0, base.most_splats()],
+        factors: &[0.5, 0.25, 2.0],
+        share: 0.5,
+        spread: 1.7,
+        ..PLAIN
     },
     Knob {
         name: "rounds",
         stage: PointStage::Color,
         option: "--rounds",
-        values: |base| base.color(|chroma| scaled(chroma.iterations, &[0.5, 0.25])),
-        time: |_, _| 1.0,
+        count: |base| base.color(|chroma| Some(chroma.iterations as f64)),
+        factors: &[0.5, 0.25],
+        share: 0.5,
+        spread: 0.8,
+        ..PLAIN
     },
     Knob {
         name: "chroma-degree",
         stage: PointStage::Color,
         option: "--sh-degree",
-        values: |base| base.color(|_| ["1", "2"].map(str::to_owned).to_vec()),
-        time: |_, value| 1.0 + 0.1 * number(value),
+        count: |base| base.color(|chroma| Some(f64::from(chroma.settings.sh_degree) + 1.0)),
+        range: DEGREES,
+        factors: &[2.0, 3.0],
+        less: 1.0,
+        power: 2.0,
+        share: 0.05,
+        spread: 1.4,
     },
     Knob {
         name: "teacher-size",
         stage: PointStage::Color,
         option: "--teacher-size",
-        values: |base| {
+        count: |base| {
             base.color(|chroma| {
-                let size = chroma.teachers.first().and_then(|t| t.info.input_size);
-                let size = size.map(|[width, height]| width.min(height) as usize);
-                size.map_or(Vec::new(), |size| scaled(size, &[0.5, 1.5]))
+                let size = chroma.teachers.first()?.info.input_size?;
+                Some(f64::from(size[0].min(size[1])))
             })
         },
-        time: |_, _| 1.0,
+        factors: &[0.5, 1.5],
+        power: 2.0,
+        share: 0.2,
+        spread: 0.7,
+        ..PLAIN
     },
 ];
 
-pub fn knob_names() -> [&'static str; KNOBS.len()] {
-    KNOBS.map(|knob| knob.name)
+pub fn knob_names() -> Vec<&'static str> {
+    KNOBS.iter().map(|knob| knob.name).collect()
+}
+
+impl Knob {
+    /// Values to try, and where the sign carries over the same compared with `small`.
+    fn values(&'static self, base: &Base, small: Option<&Value>) -> Vec<Value> {
+        let (count, [least, most]) = ((self.count)(base), (self.range)(base));
+        let mut values: Vec<Value> = Vec::new();
+        for factor in self.factors {
+            let wanted = (count * factor).round().max(1.0);
+            let doublings = self.power * (wanted / count).log2();
+            let known = values.iter().any(|value| value.doublings == doublings);
+            if count == 0.0 || wanted == count || known || !(least..=most).contains(&wanted) {
+                continue;
+            }
+            let value = Value {
+                knob: self,
+                settings: vec![setting(self.name, wanted - self.less)],
+                small: false,
+                doublings,
+            };
+            // The sign is that on smaller photos.
+            if let Some(small) = small.filter(|_| self.name == MAX_SPLATS) {
+                let count = setting(MAX_SPLATS, (wanted / 4.0).ceil());
+                values.push(Value {
+                    settings: vec![small.settings[0].clone(), count],
+                    small: true,
+                    ..value.clone()
+                });
+            }
+            values.push(value);
+        }
+        values
+    }
 }
 
 /// All values to try of the knobs that `wanted` names, or of all where it names none.
 pub(super) fn values(base: &Base, wanted: &[String]) -> Vec<Value> {
+    let side = (f64::from(base.side()) / 2.0).floor();
+    let splats = (base.report.luma.splats as f64 / 4.0).ceil();
+    let small = Value {
+        knob: &KNOBS[1],
+        settings: vec![setting(MAX_SIDE, side), setting(MAX_SPLATS, splats)],
+        small: false,
+        doublings: -2.0,
+    };
+    let small = (side >= SMALL_SIDE).then_some(&small);
     let chosen = KNOBS
         .iter()
         .filter(|knob| wanted.is_empty() || wanted.iter().any(|name| name == knob.name));
-    let values = chosen.flat_map(|knob| {
-        let values = (knob.values)(base).into_iter();
-        values.map(|value| Value {
-            stage: knob.stage,
-            time: (knob.time)(base, &value),
-            setting: Setting {
-                knob: knob.name.to_owned(),
-                value,
-            },
-        })
-    });
-    values.collect()
+    let values = chosen.flat_map(|knob| knob.values(base, small));
+    let mut values: Vec<Value> = values.collect();
+    if values.iter().any(|value| value.small) {
+        values.extend(small.cloned());
+    }
+    values
 }
 
 /// The options that settings stand for, each with its value.
@@ -211,21 +246,9 @@ pub(super) fn options(settings: &[Setting]) -> impl Iterator<Item = [&str; 2]> {
     })
 }
 
-/// These multiples of a count, rounded, without the count itself and without repeats.
-fn scaled(count: usize, factors: &[f64]) -> Vec<String> {
-    let mut values: Vec<String> = Vec::new();
-    for factor in factors {
-        let value = ((count as f64 * factor).round() as usize)
-            .max(1)
-            .to_string();
-        if value != count.to_string() && !values.contains(&value) {
-            values.push(value);
-        }
+fn setting(knob: &str, value: f64) -> Setting {
+    Setting {
+        knob: knob.to_owned(),
+        value: value.to_string(),
     }
-    values
-}
-
-/// The values of this table are numbers wherever one is needed.
-fn number(value: &str) -> f64 {
-    value.parse().unwrap_or(0.0)
 }

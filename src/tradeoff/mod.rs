@@ -1,6 +1,7 @@
 //! `tradeoff`: what quality costs in time, on the user's scene and device.
 
 mod child;
+mod curve;
 #[cfg(test)]
 mod fixtures;
 mod knobs;
@@ -11,6 +12,7 @@ mod request;
 mod search;
 mod state;
 mod sweep;
+mod worth;
 
 use std::path::{Path, PathBuf};
 
@@ -29,7 +31,7 @@ use crate::{
 use point::Bench;
 use search::Task;
 use state::SweepState;
-use sweep::{Phase, SweepPoint};
+use sweep::SweepPoint;
 
 /// Runs the points that are missing in the folder and gives the folder and all of
 /// them. The files are written anew after every point.
@@ -54,29 +56,29 @@ pub fn tradeoff(
     }
     let sides = capture.views.iter().flat_map(|view| view.photo_size());
     let largest_side = sides.max().unwrap_or(0);
-    files::make_own_folder(&folder, &["tradeoff.lock", FILES[1]], &[])?;
+    files::make_own_folder(&folder, &[FILES[0], request::POINTS], &[])?;
     let bench = Bench::new(options, &folder, largest_side)?;
     let mut state = SweepState::open(&folder, bench.subject.clone(), options.budget)?;
 
     while let Some(task) = next(options, &bench, &state.sweep)? {
-        let point = run(&bench, &task, &state.sweep, observe)?;
-        observe(Event::Note(in_words(&point)));
-        let failed = point.failed.clone();
+        let points = run(&bench, &task, &state.sweep, observe)?;
+        observe(Event::Note(in_words(&points[0])));
+        let failed = points[0].failed.clone();
         let report = bench.folder(&task.name).read_report();
-        state.add(point, report.ok().map(|report| report.device.name));
+        state.add(points, report.ok().map(|report| report.device.name));
         write(&folder, &state)?;
+        if task.expected.is_none() {
+            let said = worth::sentence(&state.sweep, task.stage);
+            let page = folder.join(FILES[1]);
+            let said = said.map_or(String::new(), |said| format!("so far {said}; "));
+            observe(Event::Note(format!("{said}see {}", page.display())));
+        }
         if let (None, Some(reason)) = (task.expected, failed) {
             return Err(TradeoffError::Base {
                 point: task.name,
                 reason,
             });
         }
-    }
-    if (state.sweep.points.iter()).all(|point| point.phase == Phase::Base) {
-        observe(Event::Note(format!(
-            "only the base fits into {:.0} minutes: the same command with a larger --budget continues from here",
-            options.budget / 60.0
-        )));
     }
     // An earlier start may have been stopped between its files.
     write(&folder, &state)?;
@@ -101,13 +103,14 @@ fn next(
     Ok(search::next(&values, sweep, options.teacher.is_some()))
 }
 
-/// Runs a point, and tells how far the budget is spent.
+/// Runs a point, and tells how far the budget is spent; the point comes first, then those on its
+/// way.
 fn run(
     bench: &Bench,
     task: &Task,
     sweep: &Tradeoff,
     observe: &mut Observer<'_>,
-) -> Result<SweepPoint, RunError> {
+) -> Result<Vec<SweepPoint>, RunError> {
     let (spent, count) = (sweep.spent(), sweep.points.len());
     let expected = task
         .expected
@@ -116,7 +119,7 @@ fn run(
         observe(Event::progress(
             Stage::Sweep,
             (spent + seconds) as usize,
-            sweep.budget.ceil() as usize,
+            sweep.limit().ceil() as usize,
             format!("{count} points; {}{expected}", task.name),
         ));
     })
@@ -138,10 +141,11 @@ fn in_words(point: &SweepPoint) -> String {
     )
 }
 
-/// Writes the three files; the one that a sweep goes on from last.
+/// Writes both files; the one that a sweep goes on from last.
 fn write(folder: &Path, state: &SweepState) -> Result<(), StoreError> {
-    let [table, _, html] = FILES.map(|name| folder.join(name));
-    files::write(&table, report::csv(&state.sweep).as_bytes())?;
-    files::write(&html, report::page(&state.sweep).as_bytes())?;
+    files::write(
+        &folder.join(FILES[1]),
+        report::page(&state.sweep).as_bytes(),
+    )?;
     state.write()
 }

@@ -7,11 +7,11 @@ use std::{
 };
 
 use super::{
-    child,
+    child, curve,
     knobs::{self, Base},
-    request::{POINTS, TradeoffError, TradeoffOptions},
+    request::{POINTS, TradeoffOptions},
     search::{Task, base_name},
-    sweep::{Outcome, Phase, PointStage, Subject, SweepPoint, Tradeoff},
+    sweep::{Outcome, PointStage, Subject, SweepPoint, Tradeoff},
 };
 use crate::{
     chroma::teacher::located,
@@ -24,6 +24,9 @@ use crate::{
 /// The option of `fit` for the longer side at which held-out views are measured: only
 /// at one size can points of several `max-side` be compared.
 const MEASURE_SIDE: &str = "--measure-side";
+
+/// The option of `fit` that keeps pictures of its way.
+const ALBUM: &str = "--album";
 
 /// Frames of `eval`'s path, of which nothing is used: as few as it takes.
 const FRAMES: &str = "2";
@@ -77,8 +80,8 @@ impl Bench {
         })
     }
 
-    /// Runs a point in an empty folder and reads what its reports say; `tell` hears now
-    /// and then how many seconds it has taken.
+    /// Runs a point in an empty folder and reads what its reports say, along its way too; `tell`
+    /// hears now and then how many seconds it has taken.
     ///
     /// # Errors
     /// [`RunError`] when the folder cannot be made. What the program itself fails at is
@@ -88,7 +91,7 @@ impl Bench {
         task: &Task,
         sweep: &Tradeoff,
         tell: &mut dyn FnMut(f64),
-    ) -> Result<SweepPoint, RunError> {
+    ) -> Result<Vec<SweepPoint>, RunError> {
         let begun = Instant::now();
         let folder = self.folder(&task.name);
         // Of a sweep that was stopped in the middle of this point.
@@ -106,16 +109,27 @@ impl Bench {
             let outcome = self.outcome(task, sweep);
             outcome.map_err(|error| error.to_string())
         });
-        Ok(SweepPoint {
+        let point = SweepPoint {
             name: task.name.clone(),
             stage: task.stage,
-            phase: task.phase,
             settings: task.settings.clone(),
+            after: None,
+            picture: curve::picture_of(&folder, &folder.contact_sheet())
+                .filter(|_| outcome.is_ok()),
             commands,
             took: begun.elapsed().as_secs_f64(),
             failed: outcome.as_ref().err().cloned(),
             outcome: outcome.ok(),
-        })
+        };
+        let of_base = |knob: &str| point.settings.iter().all(|setting| setting.knob == knob);
+        let along = match point.stage {
+            _ if point.failed.is_some() => Vec::new(),
+            PointStage::Luma if of_base("iterations") => curve::of_luma(&point, &folder)?,
+            PointStage::Color if point.is_base() => curve::of_color(&point, &folder)?,
+            // Others would crowd out what matters.
+            _ => Vec::new(),
+        };
+        Ok([vec![point], along].concat())
     }
 
     /// A point in color has the base's luma and, but for the first that asked, the
@@ -149,14 +163,16 @@ impl Bench {
                 vec![[colorize, turned_words].concat(), eval]
             }
             _ => {
-                let fit = owned(&["fit", &self.subject.scene, "-o", &folder]);
+                let fit = owned(&["fit", &self.subject.scene, "-o", &folder, ALBUM]);
                 let mut options = self.subject.options.clone();
                 for [option, _] in turned {
                     options = without(options, option);
                 }
                 options.extend(turned_words);
-                if task.phase != Phase::Base && !options.iter().any(|o| o.starts_with(MEASURE_SIDE))
-                {
+                let sized = options
+                    .iter()
+                    .any(|option| option.starts_with(MEASURE_SIDE));
+                if !task.settings.is_empty() && !sized {
                     let side = self.base(PointStage::Luma)?.side();
                     options.extend([MEASURE_SIDE.to_owned(), side.to_string()]);
                 }
@@ -166,7 +182,7 @@ impl Bench {
     }
 
     /// Outcome of a point, from its reports.
-    fn outcome(&self, task: &Task, sweep: &Tradeoff) -> Result<Outcome, TradeoffError> {
+    fn outcome(&self, task: &Task, sweep: &Tradeoff) -> Result<Outcome, RunError> {
         let folder = self.folder(&task.name);
         let report = folder.read_report()?;
         let luma = &report.luma;
@@ -180,10 +196,6 @@ impl Bench {
             peak_device_memory: luma.peak_device_memory,
             ..Outcome::default()
         };
-        if outcome.psnr.is_none() {
-            let scene = self.subject.scene.clone().into();
-            return Err(TradeoffError::NothingToMeasure(scene));
-        }
         if let Some(chroma) = &report.chroma {
             // One that asks at another size finds no answers.
             let asks = task.settings.iter().any(|s| s.knob == "teacher-size");
@@ -191,8 +203,11 @@ impl Bench {
             let asked = base.and_then(|base| base.outcome.as_ref());
             let seconds = &chroma.seconds;
             outcome.teacher_seconds = asked.map_or(seconds.teacher, |base| base.teacher_seconds);
-            outcome.seconds +=
+            outcome.seconds =
                 outcome.teacher_seconds + seconds.distill + seconds.bake + seconds.measure;
+            // Other targets, or more freedom to meet them, are no smaller error.
+            let same = task.settings.iter().all(|setting| setting.knob == "rounds");
+            outcome.loss = same.then_some(chroma.loss);
             outcome.delta_e = chroma.pictures.delta_e.map(|error| error.mean);
             outcome.consistency = consistency(&folder)?;
             outcome.colorfulness = Some(chroma.pictures.colorfulness);
@@ -259,12 +274,12 @@ mod tests {
         let task = Task {
             name: "here".to_owned(),
             stage,
-            phase: Phase::One,
             settings: vec![Setting {
                 knob: knob.to_owned(),
                 value: value.to_owned(),
             }],
             expected: None,
+            information: 0.0,
         };
         assert!(bench.outcome(&task, &sweep(Vec::new())).is_err(), "no run");
         let commands = bench.commands(&task).expect("names");
@@ -276,13 +291,13 @@ mod tests {
         assert_eq!(
             commands(PointStage::Luma, "max-side", "48"),
             [
-                "fit /my scene -o /out/points/here --preset draft --measure-side 50 --max-splats 70 --max-side 48"
+                "fit /my scene -o /out/points/here --album --preset draft --measure-side 50 --max-splats 70 --max-side 48"
             ]
         );
         assert_eq!(
             commands(PointStage::Luma, "max-splats", "35"),
             [
-                "fit /my scene -o /out/points/here --preset draft --max-side=64 --measure-side 50 --max-splats 35"
+                "fit /my scene -o /out/points/here --album --preset draft --max-side=64 --measure-side 50 --max-splats 35"
             ]
         );
     }

@@ -1,96 +1,47 @@
-//! The sweep for people: `tradeoff.csv`, `tradeoff.html` and the table that is printed.
-//! docs/tradeoff.md describes every column.
+//! The sweep for people: `tradeoff.html` and the table that is printed.
 
 use std::fmt::Write;
 
 use super::{
-    plot::{group, plot},
-    request::POINTS,
-    sweep::{Measure, Outcome, PointStage, SweepPoint, Tradeoff},
+    plot::plot,
+    sweep::{Measure, PointStage, SweepPoint, Tradeoff},
+    worth,
 };
 use crate::report::{
     Table,
     html::{TAIL, escaped, head, push_table},
 };
 
-/// The columns of the table.
-const COLUMNS: &str = "name,stage,phase,settings,on_front,iterations,splats,seconds,teacher_seconds,took_seconds,psnr_db,ssim,delta_e00,consistency_lab,colorfulness,peak_host_bytes,peak_device_bytes,failed,commands";
-
-/// A row a point as RFC 4180 has it, but for the ends of lines.
-pub(super) fn csv(sweep: &Tradeoff) -> String {
-    let mut text = COLUMNS.to_owned() + "\n";
-    for point in &sweep.points {
-        let settings = point.settings.iter();
-        let settings: Vec<String> = settings
-            .map(|setting| format!("{}={}", setting.knob, setting.value))
-            .collect();
-        let on_front = sweep.measures(point.stage).any(|measure| {
-            let front = sweep.front(point.stage, measure);
-            front.iter().any(|found| found.name == point.name)
-        });
-        let commands: Vec<String> = point.commands.iter().map(|c| shell_line(c)).collect();
-        let cells = [
-            point.name.clone(),
-            point.stage.to_string(),
-            point.phase.to_string(),
-            settings.join(" "),
-            on_front.to_string(),
-            cell(point, |o| Some(o.iterations)),
-            cell(point, |o| Some(o.splats)),
-            cell(point, |o| Some(format!("{:.3}", o.seconds))),
-            cell(point, |o| Some(format!("{:.3}", o.teacher_seconds))),
-            format!("{:.3}", point.took),
-            cell(point, |o| o.psnr),
-            cell(point, |o| o.ssim),
-            cell(point, |o| o.delta_e),
-            cell(point, |o| o.consistency),
-            cell(point, |o| o.colorfulness),
-            cell(point, |o| o.peak_host_memory),
-            cell(point, |o| o.peak_device_memory),
-            point.failed.clone().unwrap_or_default(),
-            commands.join(" && "),
-        ];
-        text += &cells.map(quoted).join(",");
-        text.push('\n');
-    }
-    text
-}
-
-/// A figure of the outcome; empty without.
-fn cell<T: ToString>(point: &SweepPoint, value: fn(&Outcome) -> Option<T>) -> String {
-    let value = point.outcome.as_ref().and_then(value);
-    value.map_or(String::new(), |value| value.to_string())
-}
-
-fn quoted(cell: String) -> String {
-    match cell.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", cell.replace('"', "\"\"")),
-        false => cell,
-    }
-}
-
-/// The front of a stage; `None` without points.
+/// The front of a stage, and what more or less time would give; `None` without points.
 pub fn front_table(sweep: &Tradeoff, stage: PointStage) -> Option<Table> {
     let front = sweep.best(stage);
     let title = match stage {
         PointStage::Luma => "Luma: the best that each time buys",
         PointStage::Color => "Color: the best that each time buys",
     };
-    (!front.is_empty()).then(|| table(sweep, stage, title, &front))
+    let mut table = (!front.is_empty()).then(|| table(sweep, stage, title, &front))?;
+    let said = worth::sentence(sweep, stage).map(|said| format!("Around the base {said}."));
+    table.notes.extend(said);
+    Some(table)
 }
 
-/// Points in figures, a failure as its reason.
+/// Points in figures, a failure as its reason; gains of the measure that decides.
 fn table(sweep: &Tradeoff, stage: PointStage, title: &str, points: &[&SweepPoint]) -> Table {
     let measures: Vec<&Measure> = sweep.measures(stage).collect();
-    let base = sweep.base(stage).and_then(|base| base.outcome.as_ref());
     let row = |point: &&SweepPoint| {
+        let other = sweep.reference(point);
         let mut row = vec![point.label()];
+        if let Some(small) = other.filter(|other| other.settings.len() > 1) {
+            row[0] += &format!(", for its sign, against {}", small.label());
+        }
+        let base = other.and_then(|base| base.outcome.as_ref());
         match &point.outcome {
             Some(outcome) => {
                 row.push(format!("{:.1}", outcome.seconds));
                 row.push(base.map_or(String::new(), |base| {
                     format!("{:.2}", outcome.seconds / base.seconds.max(1e-9))
                 }));
+                row.push(measures[0].gain(outcome, base));
                 row.extend(measures.iter().map(|measure| measure.figure(outcome)));
                 row.push(outcome.splats.to_string());
                 for memory in [outcome.peak_device_memory, outcome.peak_host_memory] {
@@ -100,13 +51,15 @@ fn table(sweep: &Tradeoff, stage: PointStage, title: &str, points: &[&SweepPoint
             None => {
                 let reason = point.failed.as_deref().unwrap_or_default();
                 row[0] += &format!(" failed: {reason}");
-                row.resize(6 + measures.len(), String::new());
+                row.resize(7 + measures.len(), String::new());
             }
         }
         row
     };
     let titles = measures.iter().map(|measure| measure.title);
-    let head = ["point", "seconds", "× base"].into_iter().chain(titles);
+    let head = ["point", "seconds", "× base", "gain"]
+        .into_iter()
+        .chain(titles);
     let head = head.chain(["Gaussians", "device MiB", "host MiB"]);
     Table {
         title: title.to_owned(),
@@ -120,7 +73,6 @@ fn table(sweep: &Tradeoff, stage: PointStage, title: &str, points: &[&SweepPoint
 const STYLE: &str = "<style>
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(380px, 1fr)); gap: 1rem; }
 .plots svg { display: block; color: var(--ink); fill: var(--quiet); background: var(--card); }
-.legend i { display: inline-block; width: .7rem; height: .7rem; border-radius: 50%; margin: 0 .35rem 0 1rem; color: var(--ink); }
 pre { white-space: pre-wrap; overflow-wrap: anywhere; font-size: .78rem; }
 </style>
 ";
@@ -144,7 +96,7 @@ pub(super) fn page(sweep: &Tradeoff) -> String {
         (sweep.device.as_ref()).map_or(String::new(), |name| format!("; {}", escaped(name))),
         sweep.points.len(),
         sweep.spent() / 60.0,
-        sweep.budget / 60.0,
+        sweep.limit() / 60.0,
     );
     for stage in PointStage::ALL {
         push_stage(&mut html, sweep, stage);
@@ -161,38 +113,32 @@ fn push_stage(html: &mut String, sweep: &Tradeoff, stage: PointStage) {
     let Some(front) = front_table(sweep, stage) else {
         return;
     };
-    let mut legend: Vec<(&str, &str)> = Vec::new();
-    html.push_str("<p class=\"legend\">");
-    for group in sweep.of(stage).map(group) {
-        if !legend.contains(&group) {
-            let (name, color) = group;
-            let _ = write!(
-                html,
-                "<i style=\"background:{color}\"></i>{}",
-                escaped(name)
-            );
-            legend.push(group);
-        }
-    }
-    html.push_str("</p>\n<div class=\"plots\">\n");
+    html.push_str("<div class=\"plots\">\n");
     for measure in sweep.measures(stage) {
         html.push_str(&plot(sweep, stage, measure));
     }
     html.push_str("</div>\n");
     push_table(html, &front);
     html.push_str("<div class=\"row\">\n");
-    for point in sweep.best(stage) {
-        // A name is letters, digits, `.`, `+` and `-`.
-        let sheet = format!("{}/{}/contact-sheet.png", POINTS, escaped(&point.name));
+    let seconds = |point: &SweepPoint| point.outcome.as_ref().map_or(0.0, |o| o.seconds);
+    let mut points: Vec<&SweepPoint> = sweep.of(stage).collect();
+    points.sort_by(|a, b| seconds(a).total_cmp(&seconds(b)));
+    let first = sweep.measures(stage).next();
+    for point in &points {
+        let (Some(picture), Some(outcome)) = (&point.picture, &point.outcome) else {
+            continue;
+        };
         let _ = writeln!(
             html,
-            "<figure><a href=\"{sheet}\"><img src=\"{sheet}\" alt=\"\" loading=\"lazy\"></a><figcaption>{}</figcaption></figure>",
-            escaped(&point.label())
+            "<figure><a href=\"{picture}\"><img src=\"{picture}\" alt=\"\" loading=\"lazy\"></a><figcaption>{}: {:.1} s{}</figcaption></figure>",
+            escaped(&point.label()),
+            outcome.seconds,
+            first.map_or(String::new(), |measure| measure.in_words(outcome)),
+            picture = escaped(picture),
         );
     }
     html.push_str("</div>\n");
-    let all: Vec<&SweepPoint> = sweep.of(stage).collect();
-    push_table(html, &table(sweep, stage, "All points", &all));
+    push_table(html, &table(sweep, stage, "All points", &points));
 }
 
 /// The program with these arguments, quoted for a POSIX shell.
@@ -215,41 +161,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_row_a_point_and_quotes_where_needed() {
-        let mut odd = failed("odd", "no \"room\", none\nat all");
-        odd.commands = vec![vec!["fit".into(), "/a,b".into()], vec!["eval".into()]];
-        let text = csv(&sweep(vec![luma("base", 10.0, 24.5), odd]));
-        let (header, rows) = text.split_once('\n').expect("a header");
-        let (base, odd) = rows.split_once('\n').expect("two rows");
-        assert_eq!(base.split(',').count(), header.split(',').count());
-        let begins = "base,luma,base,,true,700,1000,10.000,0.000,10.000,24.5,";
-        assert!(base.starts_with(begins), "{base}");
-        let end = "\"no \"\"room\"\", none\nat all\",\"gs-chroma fit /a,b && gs-chroma eval\"\n";
-        assert!(odd.starts_with("odd,luma,one,,false,,,,"), "{odd}");
-        assert!(odd.ends_with(end), "{odd}");
-    }
-
-    #[test]
     fn everything_is_on_the_page_and_nothing_breaks_it() {
         let mut odd = failed("sh-degree-3", "no <memory> & more");
         odd.commands = vec![vec!["fit".into(), "/my <scene>".into()]];
-        let sweep = sweep(vec![
-            luma("base", 10.0, 24.0),
-            luma("max-splats-500", 8.0, 23.0),
-            odd,
-        ]);
+        let look = SweepPoint {
+            after: Some(350),
+            picture: Some("points/base/album/350.png".to_owned()),
+            settings: Vec::new(),
+            ..luma("base+after-350", 5.0, 23.0)
+        };
+        let sweep = sweep(vec![luma("base", 10.0, 24.0), look, odd]);
         let table = front_table(&sweep, PointStage::Luma).expect("points");
-        let rows: Vec<String> = table.rows.iter().map(|row| row[..4].join(" ")).collect();
-        assert_eq!(
-            rows,
-            ["max-splats 500 8.0 0.80 23.00", "base 10.0 1.00 24.00"]
-        );
+        let rows: Vec<String> = table.rows.iter().map(|row| row[..5].join(" ")).collect();
+        let before = "base, after 350 iterations 5.0 0.50 -1.00 23.00";
+        assert_eq!(rows, [before, "base 10.0 1.00 +0.00 24.00"]);
+        let said = "Around the base half the time costs 1.0 dB.";
+        assert_eq!(table.notes[1], said);
         assert!(front_table(&sweep, PointStage::Color).is_none());
         let html = page(&sweep);
         for piece in [
             "&lt;garden&gt;: what quality costs",
             "gs-chroma fit --channel r;",
-            "src=\"points/max-splats-500/contact-sheet.png\"",
+            "src=\"points/base/album/350.png\"",
+            said,
             "no &lt;memory&gt; &amp; more",
             "gs-chroma fit '/my &lt;scene&gt;'",
         ] {

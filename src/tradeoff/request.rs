@@ -14,8 +14,8 @@ pub struct TradeoffOptions {
     pub fit: Vec<String>,
     /// The teacher, for points in color.
     pub teacher: Option<PathBuf>,
-    /// Wall seconds that all points may take together.
-    pub budget: f64,
+    /// Wall seconds that all points may take together; four times what the bases take by default.
+    pub budget: Option<f64>,
     /// Names of the knobs to turn; empty for all.
     pub knobs: Vec<String>,
 }
@@ -43,7 +43,7 @@ pub enum TradeoffError {
 }
 
 /// Files of `tradeoff`, beside the points' folders.
-pub const FILES: [&str; 3] = ["tradeoff.csv", "tradeoff.json", "tradeoff.html"];
+pub const FILES: [&str; 2] = ["tradeoff.json", "tradeoff.html"];
 
 /// The folder of the points' folders.
 pub(super) const POINTS: &str = "points";

@@ -1,11 +1,18 @@
-//! Choice of the next point: the bases, every setting alone, then pairs of settings that alone are
-//! on the front by now, the cheapest first.
+//! Choice of the next point: the bases, then what should tell most for its seconds.
 //!
 //! Everything follows from the points that are there and the seconds that are left, so
 //! that a sweep that goes on asks for what one without a break would have asked for.
 
-use super::knobs::{PRESET, Value};
-use super::sweep::{Phase, PointStage, Setting, Tradeoff};
+use super::{
+    knobs::Value,
+    sweep::{PointStage, Setting, Tradeoff},
+};
+
+/// Share of what a value tells that smaller photos tell: the sign.
+const SIGN: f64 = 0.5;
+
+/// Share that is left where another value has told in which direction quality goes.
+const KNOWN: f64 = 0.25;
 
 /// A point to run.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,12 +20,19 @@ pub(super) struct Task {
     /// Its name, which the settings determine.
     pub name: String,
     pub stage: PointStage,
-    /// Phase of the sweep that wants it.
-    pub phase: Phase,
     /// Settings that differ from the base.
     pub settings: Vec<Setting>,
     /// Wall seconds that it should take; `None` for a base, which runs anyway.
     pub expected: Option<f64>,
+    /// Range of what it may show, in dB.
+    pub information: f64,
+}
+
+impl Task {
+    /// Information per expected second.
+    fn rate(&self) -> f64 {
+        self.information / self.expected.unwrap_or_default().max(1e-9)
+    }
 }
 
 /// The base's name in each stage.
@@ -32,182 +46,133 @@ pub(super) fn base_name(stage: PointStage) -> &'static str {
 /// The next point of a sweep, with a teacher in color too; none when all is done or nothing
 /// that is left fits into its budget.
 pub(super) fn next(values: &[Value], sweep: &Tradeoff, color: bool) -> Option<Task> {
-    let stages = &PointStage::ALL[..1 + usize::from(color)];
-    for &stage in stages {
-        match sweep.base(stage) {
+    for stage in &PointStage::ALL[..1 + usize::from(color)] {
+        match sweep.base(*stage) {
             None => {
                 return Some(Task {
-                    name: base_name(stage).to_owned(),
-                    stage,
-                    phase: Phase::Base,
+                    name: base_name(*stage).to_owned(),
+                    stage: *stage,
                     settings: Vec::new(),
                     expected: None,
+                    information: 0.0,
                 });
             }
             // Neither the other stage nor any knob has anything to start from.
             Some(base) => base.outcome.as_ref()?,
         };
     }
-    let singles = values
-        .iter()
-        .map(|value| (value.stage, vec![&value.setting]));
-    let pairs = stages.iter().flat_map(|&stage| pairs(values, sweep, stage));
-    cheapest(values, sweep, Phase::One, singles)
-        .or_else(|| cheapest(values, sweep, Phase::Front, pairs))
+    let tasks = values.iter().filter_map(|value| task(value, values, sweep));
+    most_telling(tasks, sweep.limit() - sweep.spent())
 }
 
-/// The untried choice with the least expected time, if it fits the budget.
-fn cheapest<'a>(
-    values: &[Value],
-    sweep: &Tradeoff,
-    phase: Phase,
-    choices: impl Iterator<Item = (PointStage, Vec<&'a Setting>)>,
-) -> Option<Task> {
-    let left = sweep.budget - sweep.spent();
-    let tasks = choices.filter_map(|(stage, settings)| {
-        let seconds = expected(values, sweep, stage, &settings)?;
-        let name = name(&settings);
-        let fits = seconds <= left && sweep.find(&name).is_none();
-        fits.then(|| Task {
-            name,
-            stage,
-            phase,
-            settings: settings.into_iter().cloned().collect(),
-            expected: Some(seconds),
-        })
-    });
-    // Of several that take the same, `min_by` keeps the first.
-    let seconds = |task: &Task| task.expected.unwrap_or(0.0);
-    tasks.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
+/// The one with the most information per second of those that take no longer than `left`; of
+/// equal ones the first.
+fn most_telling(tasks: impl Iterator<Item = Task>, left: f64) -> Option<Task> {
+    let fitting = tasks.filter(|task| task.information > 0.0 && task.expected <= Some(left));
+    // `max_by` would take the last.
+    fitting.min_by(|a, b| b.rate().total_cmp(&a.rate()))
 }
 
-/// Pairs of settings that alone are on a stage's front.
-fn pairs<'a>(
-    values: &'a [Value],
-    sweep: &Tradeoff,
-    stage: PointStage,
-) -> Vec<(PointStage, Vec<&'a Setting>)> {
-    let front = sweep.best(stage);
-    let on_front = |setting: &&Setting| {
-        let name = name(&[*setting]);
-        setting.knob != PRESET && front.iter().any(|point| point.name == name)
+/// What trying a value would tell and take; `None` if it has been tried or what it is compared
+/// with has not.
+fn task(value: &Value, values: &[Value], sweep: &Tradeoff) -> Option<Task> {
+    let name = name(&value.settings);
+    let with = match value.small {
+        true => sweep.small()?,
+        false => sweep.base(value.knob.stage)?,
     };
-    // In the table's order, which is the names'.
-    let proven = values.iter().filter(|value| value.stage == stage);
-    let proven: Vec<&Setting> = proven
-        .map(|value| &value.setting)
-        .filter(on_front)
-        .collect();
-    let mut pairs = Vec::new();
-    for (place, &second) in proven.iter().enumerate() {
-        let firsts = proven[..place].iter();
-        for &first in firsts.filter(|first| first.knob != second.knob) {
-            pairs.push((stage, vec![first, second]));
-        }
-    }
-    pairs
+    let outcome = with.outcome.as_ref()?;
+    // Only the base, and whoever sees photos at another size, asks the teacher.
+    let asks = value.knob.name == "teacher-size";
+    let asking = if asks { 0.0 } else { outcome.teacher_seconds };
+    let known = values.iter().filter(|other| {
+        let point = sweep.find(&self::name(&other.settings));
+        other.knob.name == value.knob.name && point.is_some_and(|point| point.outcome.is_some())
+    });
+    let known: Vec<&Value> = known.collect();
+    let same_way = |other: &&Value| (other.doublings < 0.0) == (value.doublings < 0.0);
+    let told = known.iter().any(same_way).then_some(KNOWN);
+    let share = told.unwrap_or(1.0) * if value.small { SIGN } else { 1.0 };
+    // A value farther away than a doubling tells little more; full photos tell about smaller ones.
+    let alike = known.iter().filter(|other| value.small || !other.small);
+    let news = alike
+        .map(|other| (other.doublings - value.doublings).abs())
+        .fold(value.doublings.abs().min(1.0), f64::min);
+    sweep.find(&name).is_none().then(|| Task {
+        name,
+        stage: value.knob.stage,
+        settings: value.settings.clone(),
+        expected: Some((with.took - asking) * value.time()),
+        information: share * value.knob.spread * news,
+    })
 }
 
 /// The name of these settings: a folder's name on any system.
-fn name(settings: &[&Setting]) -> String {
+fn name(settings: &[Setting]) -> String {
     let words: Vec<String> = (settings.iter())
         .map(|setting| format!("{}-{}", setting.knob, setting.value))
         .collect();
     words.join("+")
 }
 
-/// Wall seconds that a point with these settings should take: what the base took times the
-/// factor of each, which is what it made of the time alone, or a guess before that is known.
-fn expected(
-    values: &[Value],
-    sweep: &Tradeoff,
-    stage: PointStage,
-    settings: &[&Setting],
-) -> Option<f64> {
-    let base = sweep.base(stage)?;
-    // Only the base, and whoever sees photos at another size, asks the teacher.
-    let asks = settings
-        .iter()
-        .any(|setting| setting.knob == "teacher-size");
-    let asking = base
-        .outcome
-        .as_ref()
-        .map_or(0.0, |outcome| outcome.teacher_seconds);
-    let took = base.took - if asks { 0.0 } else { asking };
-    let factors = settings.iter().map(|&setting| {
-        let alone = sweep.find(&name(&[setting]));
-        let alone = alone.filter(|point| point.outcome.is_some());
-        let guess = values.iter().find(|value| value.setting == *setting);
-        let guess = guess.map_or(1.0, |value| value.time);
-        alone.map_or(guess, |point| point.took / took.max(1e-9))
-    });
-    Some(took * factors.product::<f64>())
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::{
         fixtures,
+        knobs::KNOBS,
         sweep::{Outcome, SweepPoint},
     };
     use super::*;
 
-    /// A value with what it changes: the stage's time, and quality in dB or ΔE00.
-    type Effect = (PointStage, &'static str, &'static str, f64, f64);
-
-    const EFFECTS: [Effect; 8] = [
-        (PointStage::Luma, "iterations", "350", 0.5, -1.0),
-        (PointStage::Luma, "iterations", "1400", 2.0, 1.0),
-        (PointStage::Luma, "preset", "paper", 1.9, 0.9),
-        (PointStage::Luma, "max-splats", "500", 0.6, -0.1),
-        (PointStage::Luma, "sh-degree", "3", 2.5, -0.5),
-        (PointStage::Color, "rounds", "2", 0.5, 0.5),
-        (PointStage::Color, "chroma-degree", "1", 1.2, -0.2),
-        (PointStage::Color, "teacher-size", "128", 0.8, 0.4),
+    /// Knobs with a value and how many times its work doubles.
+    const VALUES: [(&str, &str, f64); 8] = [
+        ("iterations", "1400", 1.0),
+        ("max-splats", "500", -1.0),
+        ("max-splats", "small", -1.0),
+        ("max-splats", "250", -2.0),
+        ("max-side", "160", -2.0),
+        ("chroma-degree", "1", 2.0),
+        ("rounds", "2", -1.0),
+        ("teacher-size", "128", -2.0),
     ];
 
     fn values() -> Vec<Value> {
-        let value = |&(stage, knob, value, time, _): &Effect| Value {
-            stage,
-            time,
-            setting: Setting {
-                knob: knob.to_owned(),
-                value: value.to_owned(),
-            },
+        let setting = |knob: &str, value: &str| Setting {
+            knob: knob.to_owned(),
+            value: value.to_owned(),
         };
-        EFFECTS.iter().map(value).collect()
+        let value = |&(knob, value, doublings): &(&str, &str, f64)| {
+            let mut settings = vec![setting(knob, value)];
+            // With fewer Gaussians, and what is tried there.
+            settings.extend((knob == "max-side").then(|| setting("max-splats", "9")));
+            let small = value == "small";
+            if small {
+                settings.insert(0, setting("max-side", "160"));
+            }
+            Value {
+                knob: KNOBS.iter().find(|k| k.name == knob).expect("a knob"),
+                settings,
+                small,
+                doublings,
+            }
+        };
+        VALUES.iter().map(value).collect()
     }
 
-    /// Simulated result of a task.
+    /// Result of a task that takes as long as it should, of a base 40 seconds.
     fn run(task: &Task) -> SweepPoint {
-        let (mut seconds, mut quality) = (40.0, 0.0);
-        for setting in &task.settings {
-            let known = EFFECTS
-                .iter()
-                .find(|e| e.1 == setting.knob && e.2 == setting.value);
-            let (_, _, _, time, change) = known.expect("a value");
-            (seconds, quality) = (seconds * time, quality + change);
-        }
-        let color = task.stage == PointStage::Color;
         SweepPoint {
-            name: task.name.clone(),
             stage: task.stage,
-            phase: task.phase,
             settings: task.settings.clone(),
-            took: seconds,
+            took: task.expected.unwrap_or(40.0),
             failed: None,
-            outcome: Some(Outcome {
-                seconds,
-                psnr: (!color).then_some(24.0 + quality),
-                delta_e: color.then_some(10.0 + quality),
-                ..Outcome::default()
-            }),
-            ..fixtures::failed("", "")
+            outcome: Some(Outcome::default()),
+            ..fixtures::failed(&task.name, "")
         }
     }
 
     /// A whole sweep from points that are there.
-    fn swept(points: Vec<SweepPoint>, budget: f64) -> Tradeoff {
+    fn swept(points: Vec<SweepPoint>, budget: Option<f64>) -> Tradeoff {
         let mut sweep = fixtures::sweep(points);
         sweep.budget = budget;
         while let Some(task) = next(&values(), &sweep, true) {
@@ -221,88 +186,75 @@ mod tests {
         sweep.points.iter().map(|point| &point.name[..]).collect()
     }
 
-    const PLENTY: f64 = 1e5;
-
-    /// `teacher-size` leaves the front when rounds and degree together beat it.
     #[test]
-    fn bases_singles_then_pairs_of_the_front_each_cheapest_first() {
-        assert_eq!(
-            names(&swept(Vec::new(), PLENTY)),
-            [
-                "base",
-                "color",
-                "iterations-350",
-                "rounds-2",
-                "max-splats-500",
-                "teacher-size-128",
-                "chroma-degree-1",
-                "preset-paper",
-                "iterations-1400",
-                "sh-degree-3",
-                "iterations-350+max-splats-500",
-                "rounds-2+teacher-size-128",
-                "rounds-2+chroma-degree-1",
-                "iterations-1400+max-splats-500",
-            ]
-        );
+    fn most_information_per_second_goes_first_if_it_fits() {
+        let task = |name: &str, information, seconds| Task {
+            name: name.to_owned(),
+            stage: PointStage::Luma,
+            settings: Vec::new(),
+            expected: Some(seconds),
+            information,
+        };
+        let mut left = vec![
+            task("dear", 9.0, 100.0),
+            task("cheap", 0.1, 1.0),
+            task("telling", 3.0, 20.0),
+            task("as telling", 3.0, 20.0),
+            task("nothing", 0.0, 0.1),
+        ];
+        for expected in ["telling", "as telling", "cheap"] {
+            let next = most_telling(left.clone().into_iter(), 50.0).expect("a task");
+            assert_eq!(next.name, expected);
+            left.retain(|task| task.name != next.name);
+        }
+        assert_eq!(most_telling(left.into_iter(), 50.0), None);
     }
 
+    /// The sign of `max-splats` comes from smaller photos, once these are known; other values tell
+    /// less then. The budget is four times the bases'.
     #[test]
-    fn the_budget_is_kept_and_the_bases_run_anyway() {
-        for budget in [1.0, 100.0, 200.0, 450.0, 2000.0] {
-            let sweep = swept(Vec::new(), budget);
-            assert!(
-                sweep.spent() <= budget.max(80.0),
-                "{} of {budget}",
-                sweep.spent()
-            );
-            // The model's times are as expected, so that what is left is less than the
-            // cheapest point.
-            assert!(sweep.points.len() > 2 || budget < 100.0);
+    fn bases_then_what_tells_most_for_its_seconds() {
+        let order = [
+            "base",
+            "color",
+            "max-side-160+max-splats-9",
+            "max-side-160+max-splats-small",
+            "chroma-degree-1",
+            "iterations-1400",
+            "rounds-2",
+            "teacher-size-128",
+            "max-splats-250",
+            "max-splats-500",
+        ];
+        assert_eq!(names(&swept(Vec::new(), Some(1e5))), order);
+        let sweep = swept(Vec::new(), None);
+        assert_eq!(sweep.limit(), 320.0);
+        assert!(sweep.spent() <= 320.0 && sweep.points.len() > 7);
+        for budget in [1.0, 100.0, 200.0] {
+            let spent = swept(Vec::new(), Some(budget)).spent();
+            assert!(spent <= budget.max(80.0), "{spent} of {budget}");
         }
     }
 
     /// Stopped after any point, a sweep asks for the same points as without a break.
     #[test]
     fn a_sweep_that_goes_on_asks_for_the_same() {
-        let whole = swept(Vec::new(), 600.0);
+        let whole = swept(Vec::new(), Some(300.0));
         for stop in 0..whole.points.len() {
-            let resumed = swept(whole.points[..stop].to_vec(), 600.0);
+            let resumed = swept(whole.points[..stop].to_vec(), Some(300.0));
             assert_eq!(names(&resumed), names(&whole), "after {stop}");
         }
     }
 
     #[test]
     fn what_failed_is_not_asked_again_and_nothing_follows_a_base_that_did() {
-        let mut sweep = swept(Vec::new(), PLENTY);
-        let count = sweep.points.len();
+        let mut sweep = swept(Vec::new(), Some(1e5));
         for point in &mut sweep.points[2..] {
             point.outcome = None;
         }
         assert_eq!(next(&values(), &sweep, true), None);
-        assert_eq!(sweep.points.len(), count);
         sweep.points.truncate(1);
         sweep.points[0].outcome = None;
         assert_eq!(next(&values(), &sweep, true), None);
-    }
-
-    /// Times that were measured replace guesses; the teacher's answers are there.
-    #[test]
-    fn expectations_learn() {
-        let mut sweep = swept(Vec::new(), 150.0);
-        if let Some(outcome) = &mut sweep.points[1].outcome {
-            outcome.teacher_seconds = 10.0;
-        }
-        let values = values();
-        let seconds = |sweep: &Tradeoff, at: usize| {
-            let value = &values[at];
-            expected(&values, sweep, value.stage, &[&value.setting]).expect("a base")
-        };
-        assert_eq!(seconds(&sweep, 1), 80.0);
-        assert_eq!([seconds(&sweep, 6), seconds(&sweep, 7)], [36.0, 32.0]);
-        sweep
-            .points
-            .push(fixtures::luma("iterations-1400", 60.0, 25.0));
-        assert!((seconds(&sweep, 1) - 60.0).abs() < 1e-9);
     }
 }

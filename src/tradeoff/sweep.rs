@@ -4,7 +4,10 @@
 use serde::{Deserialize, Serialize};
 
 /// Version of the file's layout; raised when a key changes its meaning.
-pub const TRADEOFF_VERSION: u32 = 3;
+pub const TRADEOFF_VERSION: u32 = 4;
+
+/// Budget in times of the bases, where none is given.
+pub(super) const BASES: f64 = 4.0;
 
 /// `tradeoff.json`: a sweep, finished or not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,9 +20,10 @@ pub struct Tradeoff {
     pub subject: Subject,
     /// Adapter and driver, once the first point has run.
     pub device: Option<String>,
-    /// Wall seconds that the points may take together.
-    pub budget: f64,
-    /// Every point that ran, in the order in which they did.
+    /// Wall seconds that the points may take together; `None`: [`BASES`] times what the bases
+    /// took.
+    pub budget: Option<f64>,
+    /// Every point, in the order in which they were found.
     pub points: Vec<SweepPoint>,
 }
 
@@ -37,15 +41,17 @@ pub struct Subject {
 /// One choice of settings, and its outcome.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SweepPoint {
-    /// Name of its run folder under `points/`.
+    /// Name of its run folder under `points/`, or of that and a place along its curve.
     pub name: String,
     /// Stage that it measures.
     pub stage: PointStage,
-    /// Phase that asked for it.
-    pub phase: Phase,
-    /// Settings that differ from the base; empty for the base itself.
+    /// Settings that differ from the base; none of the base itself, several on smaller photos.
     pub settings: Vec<Setting>,
-    /// The program's arguments, one list for each time it was called.
+    /// Iterations or rounds after which the run was looked at; `None` at its end.
+    pub after: Option<usize>,
+    /// Its picture, below the sweep's folder.
+    pub picture: Option<String>,
+    /// The program's arguments, one list for each time it was called; none along a curve.
     pub commands: Vec<Vec<String>>,
     /// Wall seconds of all these calls, measuring among them.
     pub took: f64,
@@ -65,24 +71,9 @@ pub enum PointStage {
     Color,
 }
 
-serde_plain::derive_display_from_serialize!(PointStage);
-serde_plain::derive_display_from_serialize!(Phase);
-
 impl PointStage {
     /// Both, in the order in which they run.
     pub const ALL: [Self; 2] = [Self::Luma, Self::Color];
-}
-
-/// Phase of the sweep that asked for a point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Phase {
-    /// Everything as the preset has it.
-    Base,
-    /// One setting changed.
-    One,
-    /// Two settings that alone are on the front.
-    Front,
 }
 
 /// A knob and where it stands.
@@ -100,7 +91,7 @@ pub struct Outcome {
     pub iterations: usize,
     /// Number of Gaussians.
     pub splats: usize,
-    /// Wall seconds of all stages.
+    /// Wall seconds of its stage.
     pub seconds: f64,
     /// Those of asking the teacher: of the point that asked, where this one took its answers.
     pub teacher_seconds: f64,
@@ -108,6 +99,8 @@ pub struct Outcome {
     pub psnr: Option<f64>,
     /// Structural similarity of the gray pictures.
     pub ssim: Option<f64>,
+    /// Loss of the color solver in CIELAB units, where it is the base's but for its rounds.
+    pub loss: Option<f64>,
     /// Mean ΔE00 of the colored pictures to the photos, where these have colors.
     pub delta_e: Option<f64>,
     /// Root mean square difference of a and b, in CIELAB units, between photographed
@@ -125,7 +118,7 @@ pub struct Outcome {
 pub struct Measure {
     /// The stage whose points have it.
     pub stage: PointStage,
-    /// Name and unit, for axes and columns.
+    /// Name and, behind a comma, unit, for axes and columns.
     pub title: &'static str,
     /// Digits worth printing.
     pub digits: usize,
@@ -137,43 +130,40 @@ pub struct Measure {
 }
 
 /// The measures of both stages, the one that decides first.
-pub(super) const MEASURES: [Measure; 5] = [
-    Measure {
-        stage: PointStage::Luma,
-        title: "PSNR, dB",
-        digits: 2,
-        sign: 1.0,
-        value: |outcome| outcome.psnr,
-    },
-    Measure {
-        stage: PointStage::Luma,
-        title: "SSIM",
-        digits: 4,
-        sign: 1.0,
-        value: |outcome| outcome.ssim,
-    },
-    Measure {
-        stage: PointStage::Color,
-        title: "ΔE00 to the photos",
-        digits: 2,
-        sign: -1.0,
-        value: |outcome| outcome.delta_e,
-    },
-    Measure {
-        stage: PointStage::Color,
-        title: "inconsistency of views, a/b",
-        digits: 2,
-        sign: -1.0,
-        value: |outcome| outcome.consistency,
-    },
-    Measure {
-        stage: PointStage::Color,
-        title: "colorfulness",
-        digits: 1,
-        sign: 0.0,
-        value: |outcome| outcome.colorfulness,
-    },
+pub(super) const MEASURES: [Measure; 6] = [
+    measure(PointStage::Luma, "PSNR, dB", 2, 1.0, |o| o.psnr),
+    measure(PointStage::Luma, "SSIM", 4, 1.0, |o| o.ssim),
+    measure(PointStage::Color, "ΔE00 to the photos", 2, -1.0, |o| {
+        o.delta_e
+    }),
+    measure(
+        PointStage::Color,
+        "inconsistency of views, a/b",
+        2,
+        -1.0,
+        |o| o.consistency,
+    ),
+    measure(PointStage::Color, "colorfulness", 1, 0.0, |o| {
+        o.colorfulness
+    }),
+    measure(PointStage::Color, "loss", 3, -1.0, |o| o.loss),
 ];
+
+const fn measure(
+    stage: PointStage,
+    title: &'static str,
+    digits: usize,
+    sign: f64,
+    value: fn(&Outcome) -> Option<f64>,
+) -> Measure {
+    Measure {
+        stage,
+        title,
+        digits,
+        sign,
+        value,
+    }
+}
 
 impl Measure {
     /// An outcome's figure in words; empty without.
@@ -186,6 +176,26 @@ impl Measure {
         }
     }
 
+    /// How much better an outcome is than another; empty without figures or where neither more
+    /// nor less is better.
+    pub fn gain(&self, outcome: &Outcome, other: Option<&Outcome>) -> String {
+        let [found, before] = [Some(outcome), other].map(|of| of.and_then(self.value));
+        let gain = found.zip(before).filter(|_| self.sign != 0.0);
+        let digits = self.digits;
+        gain.map_or(String::new(), |(found, before)| {
+            // No minus before nothing.
+            format!("{:+.digits$}", self.sign * (found - before) + 0.0)
+        })
+    }
+
+    /// Unit of a difference.
+    pub fn unit(&self) -> &'static str {
+        match self.title.split_once(", ") {
+            Some((_, unit)) => unit,
+            None => self.title,
+        }
+    }
+
     /// An outcome's figure with its digits; empty without.
     pub fn figure(&self, outcome: &Outcome) -> String {
         let digits = self.digits;
@@ -194,19 +204,28 @@ impl Measure {
 }
 
 impl SweepPoint {
-    /// Its settings in words, `base` without any.
+    /// Returns true for a run as the preset has it.
+    pub fn is_base(&self) -> bool {
+        self.settings.is_empty() && self.after.is_none()
+    }
+
+    /// Its settings in words, `base` without any, and where along its run it is.
     pub fn label(&self) -> String {
-        let settings: Vec<String> = (self.settings.iter())
+        let settings = self.settings.iter();
+        let mut words: Vec<String> = settings
             .map(|setting| format!("{} {}", setting.knob, setting.value))
             .collect();
-        match settings.is_empty() {
-            true => "base".to_owned(),
-            false => settings.join(", "),
-        }
+        words.extend(self.settings.is_empty().then(|| "base".to_owned()));
+        let steps = match self.stage {
+            PointStage::Luma => "iterations",
+            PointStage::Color => "rounds",
+        };
+        words.extend(self.after.map(|after| format!("after {after} {steps}")));
+        words.join(", ")
     }
 
     /// Seconds and, larger where it is better, figure of merit.
-    fn place(&self, measure: &Measure) -> Option<[f64; 2]> {
+    pub fn place(&self, measure: &Measure) -> Option<[f64; 2]> {
         let outcome = self.outcome.as_ref()?;
         let place = [outcome.seconds, measure.sign * (measure.value)(outcome)?];
         (measure.sign != 0.0 && place.iter().all(|figure| figure.is_finite())).then_some(place)
@@ -218,6 +237,13 @@ impl Tradeoff {
     pub fn to_json(&self) -> String {
         // Plain structs with string keys: serializing them cannot fail.
         serde_json::to_string_pretty(self).unwrap_or_default()
+    }
+
+    /// Wall seconds that the points may take together.
+    pub fn limit(&self) -> f64 {
+        let bases = self.points.iter().filter(|point| point.is_base());
+        let took: f64 = bases.map(|base| base.took).sum();
+        self.budget.unwrap_or(BASES * took)
     }
 
     /// Wall seconds that the points took.
@@ -235,7 +261,19 @@ impl Tradeoff {
 
     /// The base of a stage, where it ran.
     pub fn base(&self, stage: PointStage) -> Option<&SweepPoint> {
-        self.of(stage).find(|point| point.phase == Phase::Base)
+        self.of(stage).find(|point| point.is_base())
+    }
+
+    /// The first on smaller photos, which others there are compared with.
+    pub fn small(&self) -> Option<&SweepPoint> {
+        self.points.iter().find(|point| point.settings.len() > 1)
+    }
+
+    /// The point that another is compared with.
+    pub fn reference(&self, point: &SweepPoint) -> Option<&SweepPoint> {
+        let among = |small: &&SweepPoint| point.settings.len() > 1 && small.name != point.name;
+        let small = self.small().filter(among);
+        small.or_else(|| self.base(point.stage))
     }
 
     /// The measures that some point of a stage has.
@@ -275,36 +313,26 @@ mod tests {
     use super::super::fixtures::{failed, luma, sweep};
     use super::*;
 
+    /// The definition, applied to every pair; another stage, failures and what is not finite do
+    /// not count.
     #[test]
-    fn the_front_is_of_one_stage_and_leaves_failures_out() {
-        let mut color = luma("color", 1.0, 99.0);
-        color.stage = PointStage::Color;
-        let sweep = sweep(vec![
-            luma("base", 10.0, 24.0),
-            color,
-            failed("sh-3", "no memory"),
-            luma("side-200", 5.0, 22.0),
-            luma("splats-5", 12.0, 23.0),
-            luma("splats-6", 5.0, 22.0),
-            luma("splats-7", 1.0, f64::INFINITY),
-        ]);
-        let names: Vec<&str> = (sweep.best(PointStage::Luma).iter())
-            .map(|point| &point.name[..])
-            .collect();
-        assert_eq!(names, ["side-200", "base"]);
-        assert!(sweep.best(PointStage::Color).is_empty());
-        assert_eq!(sweep.measures(PointStage::Luma).count(), 2);
-    }
-
-    /// The definition, applied to every pair.
-    #[test]
-    fn against_the_definition() {
+    fn the_front_is_what_no_other_beats() {
         let mut random = fastrand::Rng::with_seed(3);
         for _ in 0..200 {
             let places: Vec<[f64; 2]> = (0..random.usize(1..12))
                 .map(|_| [random.u8(0..6), random.u8(0..6)].map(f64::from))
                 .collect();
-            let points = places.iter().map(|&[x, y]| luma("side-1", x, y)).collect();
+            let mut points: Vec<SweepPoint> =
+                places.iter().map(|&[x, y]| luma("side-1", x, y)).collect();
+            let color = SweepPoint {
+                stage: PointStage::Color,
+                ..luma("color", -1.0, 99.0)
+            };
+            points.extend([
+                color,
+                failed("sh-3", ""),
+                luma("side-2", -1.0, f64::INFINITY),
+            ]);
             let beats = |a: [f64; 2], b: [f64; 2]| a != b && a[0] <= b[0] && a[1] >= b[1];
             let mut expected: Vec<[f64; 2]> = (places.iter().copied())
                 .filter(|&place| !places.iter().any(|&other| beats(other, place)))
@@ -316,6 +344,7 @@ mod tests {
                 .filter_map(|point| point.place(&MEASURES[0]))
                 .collect();
             assert_eq!(found, expected, "{places:?}");
+            assert!(sweep.best(PointStage::Color).is_empty());
         }
     }
 }

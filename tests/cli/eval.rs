@@ -125,7 +125,7 @@ fn the_photos_as_a_teacher_make_no_error() {
         .collect();
     assert_eq!(
         methods,
-        ["native", "exported", "teacher", "rgb_splats", "photo"]
+        ["exported", "native", "teacher", "rgb_splats", "photo"]
     );
 }
 
@@ -207,8 +207,9 @@ fn the_page_shows_every_view_with_files_that_are_there() {
         assert_eq!([image.width(), image.height()], scene::SIZE, "{file}");
         sources += 1;
     }
-    // Photo, luma, ours and two maps a view, the frames, and the first where there is no film.
-    assert_eq!(sources, 5 * scene::HELD_OUT + 3 + usize::from(!film));
+    // Photo, luma, ours and two maps a view, luma and ours a frame, and the first where there is
+    // no film.
+    assert_eq!(sources, 5 * scene::HELD_OUT + 2 * 3 + usize::from(!film));
     assert!(page.contains(&scene::name(8)), "{page}");
 
     // A second evaluation leaves nothing of the first, a new coloring neither.

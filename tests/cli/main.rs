@@ -5,6 +5,7 @@
 
 use gs_chroma::low_level::oracle;
 
+mod against;
 mod auto;
 mod blocks;
 mod checkup;

@@ -3,7 +3,6 @@
 use std::{
     io::{BufRead, BufReader, Read},
     process::{Child, Stdio},
-    sync::LazyLock,
     thread::sleep,
     time::{Duration, Instant},
 };
@@ -42,12 +41,6 @@ fn fit(more: &[&'static str]) -> Vec<&'static str> {
     [&FIT[..], &OFTEN, more].concat()
 }
 
-fn started(place: &Place, more: &[&'static str]) -> Child {
-    let mut command = place.command(&fit(more));
-    let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
-    quiet.spawn().expect("the program starts")
-}
-
 /// Waits for a checkpoint of a program that has not ended.
 fn wait_for_checkpoint(place: &Place, child: &mut Child, name: &str) {
     let begun = Instant::now();
@@ -56,6 +49,16 @@ fn wait_for_checkpoint(place: &Place, child: &mut Child, name: &str) {
         assert!(begun.elapsed() < Duration::from_secs(120), "no checkpoint");
         sleep(Duration::from_millis(1));
     }
+}
+
+/// Kills a command once it has a checkpoint.
+fn killed(place: &Place, command: &[&str], checkpoint: &str) {
+    let mut command = place.command(&[command, &OFTEN].concat());
+    let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = quiet.spawn().expect("the program starts");
+    wait_for_checkpoint(place, &mut child, checkpoint);
+    child.kill().expect("it is there");
+    child.wait().expect("a child");
 }
 
 /// The log but for its times.
@@ -69,31 +72,33 @@ fn log(place: &Place) -> Vec<String> {
     text.lines().map(kept).collect()
 }
 
-/// The bytes and the log of a training that nothing interrupts.
-static WHOLE: LazyLock<(Vec<u8>, Vec<String>)> = LazyLock::new(|| {
-    let place = place_with_scene();
-    place.succeed(&fit(&[]));
-    assert_eq!(
-        place.files("run"),
-        ["contact-sheet.png", "log.csv", "luma.ply", "report.json"]
-    );
-    (place.read("run/luma.ply"), log(&place))
-});
-
 #[test]
 fn a_training_that_is_killed_goes_on() {
-    let whole = &*WHOLE;
+    killed_twice(&FIT);
+}
+
+/// The statistics of 3DGS's rules are kept as well.
+#[test]
+fn a_training_as_the_paper_does_it_goes_on() {
+    let fit = ["fit", "scene", "--as-paper", "--iterations", "300"];
+    killed_twice(&[&fit[..], &["--no-fill-gaps", "-o", "run"]].concat());
+}
+
+fn killed_twice(fit: &[&str]) {
+    let whole = place_with_scene();
+    whole.succeed(&[fit, &OFTEN].concat());
+    assert_eq!(
+        whole.files("run"),
+        ["contact-sheet.png", "log.csv", "luma.ply", "report.json"]
+    );
     let place = place_with_scene();
     // Killed again on its way from the first checkpoint.
     for more in [&[][..], &["--resume"]] {
-        let mut child = started(&place, more);
-        wait_for_checkpoint(&place, &mut child, "run/checkpoint");
-        child.kill().expect("it is there");
-        child.wait().expect("a child");
+        killed(&place, &[fit, more].concat(), "run/checkpoint");
     }
-    place.succeed(&fit(&["--resume"]));
-    assert!(place.read("run/luma.ply") == whole.0);
-    assert_eq!(log(&place), whole.1);
+    place.succeed(&[fit, &["--resume"]].concat());
+    assert!(place.read("run/luma.ply") == whole.read("run/luma.ply"));
+    assert_eq!(log(&place), log(&whole));
     assert!(!place.path("run/checkpoint").exists());
 }
 
@@ -145,10 +150,7 @@ fn what_cannot_go_on_is_refused_with_what_differs() {
             assert!(done.stderr.contains(part), "{part}: {}", done.stderr);
         }
     };
-    let mut child = started(&place, &[]);
-    wait_for_checkpoint(&place, &mut child, "run/checkpoint");
-    child.kill().expect("it is there");
-    child.wait().expect("a child");
+    killed(&place, &FIT, "run/checkpoint");
     let kept = place.read("run/checkpoint");
     refused(
         &["--resume", "--seed", "7"],
@@ -261,16 +263,6 @@ fn colors(place: &Place) -> [Vec<u8>; 2] {
     ["color.ply", "chroma.npy"].map(|name| place.read(&format!("runs/scene/{name}")))
 }
 
-/// Kills a coloring once it has a checkpoint.
-fn killed(place: &Place, colorize: &[&str]) {
-    let mut command = place.command(&[colorize, &OFTEN].concat());
-    let quiet = command.stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = quiet.spawn().expect("the program starts");
-    wait_for_checkpoint(place, &mut child, "runs/scene/checkpoint-color");
-    child.kill().expect("it is there");
-    child.wait().expect("a child");
-}
-
 #[test]
 fn a_coloring_that_is_killed_goes_on() {
     killed_and_resumed(&COLORIZE);
@@ -290,7 +282,7 @@ fn killed_and_resumed(colorize: &[&str]) {
     let chroma = whole.report("runs/scene")["chroma"].clone();
     let whole = colors(&whole);
     let place = place_to_color();
-    killed(&place, colorize);
+    killed(&place, colorize, "runs/scene/checkpoint-color");
     let resumed = place.run(&[colorize, &["--resume"]].concat());
     assert_eq!(resumed.code, Some(0), "{}", resumed.stderr);
     assert!(
@@ -310,6 +302,17 @@ fn killed_and_resumed(colorize: &[&str]) {
     ] {
         assert_eq!(now[key], chroma[key], "{key}");
     }
+    // Seconds go on, too.
+    let [until, steps] = ["until", "iterations"].map(|key| now[key].as_f64().expect("a number"));
+    let log = String::from_utf8(place.read("runs/scene/log.csv")).expect("text");
+    let rows = log
+        .lines()
+        .map(|row| row.split(',').map(|cell| cell.parse().unwrap_or(0.0)));
+    let rows = rows
+        .map(Iterator::collect)
+        .filter(|row: &Vec<f64>| row[0] > until - steps);
+    let seconds: Vec<f64> = rows.map(|row| row[3]).collect();
+    assert!(seconds.len() > 1 && seconds.is_sorted(), "{seconds:?}");
     assert!(!place.path("runs/scene/checkpoint-color").exists());
 }
 
@@ -401,7 +404,7 @@ fn a_coloring_of_gaussians_that_wait_on_the_host() {
     }
 
     let (place, _) = many();
-    killed(&place, &within);
+    killed(&place, &within, "runs/scene/checkpoint-color");
     place.succeed(&[&within[..], &["--resume"]].concat());
     assert!(colors(&place) == streamed);
 }
@@ -409,7 +412,7 @@ fn a_coloring_of_gaussians_that_wait_on_the_host() {
 #[test]
 fn a_coloring_by_others_is_not_gone_on_with() {
     let place = place_to_color();
-    killed(&place, &COLORIZE);
+    killed(&place, &COLORIZE, "runs/scene/checkpoint-color");
     std::fs::copy(place.path("colored/00.png"), place.path("colored/03.png")).expect("copied");
     let done = place.run(&[&COLORIZE[..], &["--resume"]].concat());
     assert_eq!(done.code, Some(1), "{}", done.stderr);

@@ -178,6 +178,24 @@ fn gray_with_class_and_code_in_rgb_out() {
         assert_near(found, ab_of_moved(level), 0.05);
         assert_eq!(kind, "BigColor");
     }
+    // Each class more moves RGB by a half.
+    let chosen = TeacherSettings {
+        class: Some(1),
+        ..settings(None, Some(32))
+    };
+    let (found, _) = color("bigcolor_tiny.onnx", &chosen, 0);
+    assert_near(found, ab_of_rgb([0.9, 0.7, 0.6]), 0.05);
+    let message = refusal(
+        &fixture("ddcolor_tiny.onnx"),
+        &TeacherSettings {
+            size: None,
+            ..chosen
+        },
+    );
+    assert!(
+        message.contains("ddcolor_tiny.onnx: takes no class"),
+        "{message}"
+    );
     let path = fixture("bigcolor_tiny.onnx");
     let mut teacher = open_with(&path, Some(folder.path()), &settings(None, Some(32))).unwrap();
     assert_eq!(teacher.describe().input_size, Some([32, 32]));

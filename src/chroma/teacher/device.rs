@@ -2,7 +2,7 @@
 
 use super::bounded::bounded;
 use super::error::first_line;
-use super::{TeacherDevice, TeacherError, TeacherSettings};
+use super::{TeacherDevice, TeacherError, TeacherSettings, runtime};
 use ort::environment::Environment;
 use ort::ep::{CUDA, CoreML, DirectML, ExecutionProvider, ExecutionProviderDispatch};
 use ort::session::{Session, builder::GraphOptimizationLevel};
@@ -80,6 +80,16 @@ pub(super) fn load(
         _ => &[settings.device],
     };
     first_that_takes(tried, on)
+}
+
+/// Loads a model of another purpose as those of teachers are by default.
+///
+/// # Errors
+/// [`TeacherError::BadModel`], and those of finding ONNX Runtime.
+#[cfg(feature = "cli")]
+pub(crate) fn load_model(path: &Path) -> Result<Session, TeacherError> {
+    let placed = load(path, &runtime::environment()?, &TeacherSettings::default())?;
+    Ok(placed.made)
 }
 
 /// Result on the first of some devices that succeeds; the last one's error if none does.

@@ -165,6 +165,12 @@ pub enum TeacherError {
         /// Reason, and sizes that are possible.
         reason: String,
     },
+    /// A class was asked for, and the model takes none.
+    #[error("{}: takes no class", path.display())]
+    NoClass {
+        /// The `.onnx` file.
+        path: PathBuf,
+    },
     /// A hint says something about every pixel.
     #[error(
         "{}: has no transparency and is not its photo with strokes on it, so it would paint the \

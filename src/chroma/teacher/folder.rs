@@ -74,6 +74,7 @@ impl FolderTeacher {
             sha256: None,
             device: None,
             input_size: None,
+            class: None,
         }
     }
 

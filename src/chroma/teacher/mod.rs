@@ -21,7 +21,7 @@ mod places;
 mod plausible;
 mod profile;
 mod query;
-pub(crate) mod runtime;
+mod runtime;
 mod settings;
 mod shown;
 mod tensor;
@@ -37,11 +37,11 @@ pub use hints::{HintFolder, HintImage};
 pub use images::{AbImage, GrayImage};
 pub(super) use images::{Filter, resample};
 pub use network::{NetworkTeacher, ProfileSource};
-#[cfg(feature = "cli")]
-pub(crate) use places::cache_folder;
 pub use query::Query;
 pub use settings::{TeacherDevice, TeacherInfo, TeacherSettings};
 pub use upsample::Upsample;
+#[cfg(feature = "cli")]
+pub(crate) use {device::load_model, places::cache_folder};
 
 use std::path::{Path, PathBuf};
 

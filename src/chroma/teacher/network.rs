@@ -138,10 +138,11 @@ impl NetworkTeacher {
     /// A model that is asked as a contract says which fits it, and keeps no answers.
     ///
     /// # Errors
-    /// [`TeacherError::BadSize`] where it cannot be asked at the settings' size.
+    /// [`TeacherError::BadSize`] where it cannot be asked at the settings' size,
+    /// [`TeacherError::NoClass`] where it takes none and the settings have one.
     pub(super) fn following(
         loaded: Loaded,
-        profile: Profile,
+        mut profile: Profile,
         fit: Fit,
         settings: &TeacherSettings,
     ) -> Result<Self, TeacherError> {
@@ -151,6 +152,11 @@ impl NetworkTeacher {
             size,
             reason,
         })?;
+        profile.class = settings.class.or(profile.class);
+        if profile.class.is_some() && !profile.takes_class() {
+            let path = loaded.path;
+            return Err(TeacherError::NoClass { path });
+        }
         Ok(Self {
             loaded,
             profile,
@@ -171,6 +177,7 @@ impl NetworkTeacher {
             sha256: Some(self.loaded.sha256.clone()),
             device: Some(self.loaded.device),
             input_size: Some(self.profile.input_size(square, self.fit.fixed, self.size)),
+            class: self.profile.class,
         }
     }
 
@@ -431,6 +438,7 @@ fn other(profile: &Profile, role: Role, port: &Port) -> Result<SessionInputValue
     let count = port.len().unwrap_or(0);
     let values = match role {
         Role::Noise => noise(count, profile.noise_std.unwrap_or(1.0)),
+        Role::Class => vec![profile.class.unwrap_or(0).into(); count],
         _ => vec![0.0; count],
     };
     tensor::of(port.element, port.closed(), values)

@@ -56,6 +56,9 @@ pub(super) struct Profile {
     /// Standard deviation of the random code.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_std: Option<f32>,
+    /// The class that a model is asked with, where it takes one; none for 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<u16>,
 }
 
 /// Role of a model's input.
@@ -68,7 +71,7 @@ pub(super) enum Role {
     Hints,
     /// 1 where something is painted, else 0, `[1, 1, H, W]`.
     Mask,
-    /// The number of a class: integers, all 0.
+    /// The number of a class: integers, all the same.
     Class,
     /// A random code: the same normally distributed numbers for each photo,
     /// of mean 0 and deviation `noise_std`.
@@ -231,10 +234,16 @@ impl Profile {
                 .is_some_and(|std| !(std.is_finite() && std >= 0.0))
         {
             "noise_std: must be a number from 0 on, belongs with \"noise\" among the inputs, and only there"
+        } else if self.class.is_some() && !self.takes_class() {
+            "class: belongs with \"class\" among the inputs, and only there"
         } else {
             return Ok(());
         };
         Err(wrong.to_owned())
+    }
+
+    pub fn takes_class(&self) -> bool {
+        self.inputs.contains(&Role::Class)
     }
 
     /// Values of the input's channels for a gray from 0 to 1.
@@ -435,6 +444,7 @@ mod tests {
             ("[\"image\"]", "[\"image\", \"hints\"]", "hint_range: "),
             ("[\"image\"]", "[\"image\", \"noise\"]", "noise_std: "),
             ("size = 512", "noise_std = 1\nsize = 512", "noise_std: "),
+            ("size = 512", "class = 1\nsize = 512", "class: "),
             ("mean = [0, 0, 0]", "mean = [0]", "mean and std: "),
             ("std = [1, 1, 1]", "std = [1, 0, 1]", "mean and std: "),
             ("std = [1, 1, 1]", "std = [1, nan, 1]", "mean and std: "),

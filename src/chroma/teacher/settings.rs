@@ -46,6 +46,9 @@ pub struct TeacherSettings {
     /// Side in pixels of a network's input where the model leaves it open; none
     /// for the profile's.
     pub size: Option<u32>,
+    /// The class of a network that takes one; none for the profile's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<u16>,
     /// On which processor a network runs.
     pub device: TeacherDevice,
     /// Enlargement of answers smaller than the photo.
@@ -59,6 +62,7 @@ impl Default for TeacherSettings {
         Self {
             profile: None,
             size: None,
+            class: None,
             device: TeacherDevice::default(),
             upsample: Upsample::default(),
             // The largest of the networks known take 20 s on two old cores.
@@ -87,6 +91,9 @@ pub struct TeacherInfo {
     ///
     /// `None` for a folder. Twice the shorter side where the longer follows the photo's aspect.
     pub input_size: Option<[u32; 2]>,
+    /// Class that the network was asked with, where one was chosen.
+    #[serde(default)]
+    pub class: Option<u16>,
 }
 
 /// The last part of a path, for reports.

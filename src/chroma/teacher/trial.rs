@@ -194,6 +194,7 @@ fn candidate(guess: &GuessedProfile, layout: Layout, input: &Input) -> Profile {
         output_range: [0.0, 1.0],
         hint_range: None,
         noise_std: None,
+        class: None,
     }
 }
 

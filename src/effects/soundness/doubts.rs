@@ -1,15 +1,10 @@
 //! Doubts about a scene that do not depend on its model.
 
-use glam::DVec3;
-
-use super::photos::{median, photos};
+use super::photos::photos;
 use crate::capture::{Camera, Capture, Photo};
 
 /// Pixels along a side of a photo that shows anything.
 const LEAST_SIDE: u32 = 8;
-
-/// Distances between cameras, as a share of that to what they see, that tell no depth.
-const NO_BASELINE: f64 = 1e-3;
 
 /// Focal lengths as a share of a photo's side: from a view of 169 degrees to that of a microscope.
 const FOCAL: [f64; 2] = [0.05, 200.0];
@@ -23,16 +18,11 @@ const EXTREMES: f64 = 5e-4;
 pub fn doubts(capture: &Capture, cameras: &[Camera]) -> Vec<String> {
     let mut doubts = Vec::new();
     let count = photos(capture).0.len();
-    let centers: Vec<DVec3> = cameras.iter().map(Camera::center).collect();
-    let apart = centers.iter().map(|at| at.distance(centers[0]));
-    let apart = apart.fold(0.0, f64::max);
-    let points = capture.points.iter().map(|point| point.position);
-    let far = median(points.map(|at| at.distance(centers[0])).collect());
     if count == 1 {
         doubts.push("there is one photo: nothing tells depths; add photos from elsewhere".into());
-    } else if apart <= NO_BASELINE * far.unwrap_or(0.0) {
+    } else if capture.is_panorama() {
         doubts.push(format!(
-            "all {count} photos are taken from one place: nothing tells depths; add photos from elsewhere"
+            "all {count} photos are taken from one place: the scene is a panorama without depth, right from there only"
         ));
     }
     let small = |camera: &&Camera| camera.width.min(camera.height) < LEAST_SIDE;
@@ -85,6 +75,8 @@ impl Levels {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::effects::fixtures::{capture, looking_along_z, photo};
 

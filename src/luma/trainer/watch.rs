@@ -2,7 +2,10 @@
 
 use std::{sync::Arc, time::Instant};
 
-use super::{scores::Watch, state::LumaTrainer};
+use super::{
+    scores::{AlbumPicture, Watch},
+    state::LumaTrainer,
+};
 use crate::{
     gpu::{GpuError, Recorder},
     luma::{LumaError, TrainingView, TrainingViews, curve::CurvePoint, settings::SYNC_EVERY, view},
@@ -57,6 +60,16 @@ impl LumaTrainer {
         Ok(())
     }
 
+    /// Keeps pictures of the first view that is watched.
+    pub fn keep_album(&mut self) {
+        self.watch.album = Some(Vec::new());
+    }
+
+    /// Pictures kept so far; their views are counted among those that are watched.
+    pub fn album(&mut self) -> Vec<AlbumPicture> {
+        self.watch.album.take().unwrap_or_default()
+    }
+
     /// Held-out scores so far.
     pub fn curve(&self) -> &[CurvePoint] {
         &self.watch.curve
@@ -82,7 +95,15 @@ impl LumaTrainer {
         let mut sum = 0.0;
         for place in 0..self.watch.counting.len() {
             let view = view::load(&*views, self.watch.counting[place])?;
-            sum += self.psnr(&view, iteration)?;
+            let pixels = self.drawn(&view, iteration)?;
+            let exposed = |luma: f32| view.exposure.shown(f64::from(luma)) as f32;
+            if place == 0 && self.watch.album.is_some() {
+                let shown: Vec<f32> = pixels.iter().map(|&luma| exposed(luma)).collect();
+                let size = [view.camera.width, view.camera.height];
+                self.watch.keep(iteration, size, &shown);
+            }
+            let (shown, truth) = view.compared(&pixels, exposed);
+            sum += measure::reported_psnr(&shown, &truth);
         }
         self.watch.curve.push(CurvePoint {
             iteration,
@@ -95,9 +116,9 @@ impl LumaTrainer {
         Ok(())
     }
 
-    /// PSNR of one view, over the pixels that count.
-    fn psnr(&mut self, watched: &TrainingView, iteration: usize) -> Result<f64, GpuError> {
-        let pixels = loop {
+    /// Picture of one view, `[height, width]`.
+    fn drawn(&mut self, watched: &TrainingView, iteration: usize) -> Result<Vec<f32>, GpuError> {
+        loop {
             let degree = self.degree_at(iteration);
             let view = ViewUniform::new(&watched.camera, self.near, self.model.len(), degree);
             let workspace = self.workspace()?;
@@ -107,12 +128,9 @@ impl LumaTrainer {
             workspace.layer.record(&self.raster, &mut recorder);
             recorder.submit();
             match workspace.lists.status(&self.gpu)?.overflow {
-                None => break workspace.layer.read_image(&self.gpu, view.pixel_count())?,
+                None => return workspace.layer.read_image(&self.gpu, view.pixel_count()),
                 Some(needed) => self.make_room(needed, iteration)?,
             }
-        };
-        let shown = |luma: f32| watched.exposure.shown(f64::from(luma)) as f32;
-        let (shown, truth) = watched.compared(&pixels, shown);
-        Ok(measure::reported_psnr(&shown, &truth))
+        }
     }
 }

@@ -40,7 +40,7 @@ pub fn colorize(
     let supervised = coloring.teach(observe)?;
     let seconds = begun.elapsed().as_secs_f64();
     coloring.relight(&supervised.settings, observe)?;
-    let solved = coloring.solve(&supervised, begun, observe)?;
+    let solved = coloring.solve(&supervised, started, observe)?;
     let begun = Instant::now();
     let measured = coloring.measure(&supervised, &solved.colored, observe)?;
     observe(Event::begins(Stage::Saving));
@@ -49,7 +49,7 @@ pub fn colorize(
         chroma.warnings = warnings.take();
         chroma.seconds.teacher = seconds;
         chroma.seconds.measure = begun.elapsed().as_secs_f64();
-        chroma.seconds.all = started.elapsed().as_secs_f64();
+        chroma.seconds.all = solved.begun.elapsed().as_secs_f64();
     }
     coloring.commit(&solved, &measured.rows, &mut report, observe)?;
     Ok((coloring.output, report))

@@ -28,6 +28,8 @@ pub(super) struct Solved {
     /// Rows of the log.
     pub log: String,
     pub timings: Option<Vec<KernelReport>>,
+    /// Beginning of the command, as if it had never been interrupted.
+    pub begun: Instant,
 }
 
 impl Coloring<'_> {
@@ -53,6 +55,7 @@ impl Coloring<'_> {
                 None
             }
         };
+        let begun = found.as_ref().map_or(begun, Found::begun);
         let journal = &Journal::new(found.as_ref().map_or(String::new(), Found::log), observe);
         let checkpointing = kept.map(|folder| {
             let question = self.question(folder, settings, &supervised.taught.wanted)?;
@@ -102,6 +105,7 @@ impl Coloring<'_> {
             colored,
             log: journal.rows(),
             timings,
+            begun,
         })
     }
 

@@ -140,6 +140,7 @@ pub fn fit(
         report: &mut report,
     }
     .write(&folder)?;
+    trained.write_album(&dataset, &folder)?;
     match options.goal.psnr().and_then(|psnr| trained.misses(psnr)) {
         Some(error) => Err(error),
         None => Ok((folder, report)),

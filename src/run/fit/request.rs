@@ -93,6 +93,8 @@ pub struct FitRequest {
     pub load: LoadOptions,
     /// Longer side at which held-out views are measured; that of training by default.
     pub measure_side: Option<u32>,
+    /// Pictures of a view during training are kept.
+    pub album: bool,
     /// Effects that are on or off regardless of the evidence.
     pub overrules: Overrules,
     /// Gaussians to start from.

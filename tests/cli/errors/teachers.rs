@@ -117,6 +117,12 @@ pub(super) const CASES: &[Case] = &[
         &["ddcolor_tiny.onnx", "--teacher-size 64", "takes 32"],
     ),
     case(
+        "a class for a network without",
+        nothing,
+        "colorize --teacher onnx/ddcolor_tiny.onnx --teacher-class 3",
+        &["ddcolor_tiny.onnx", "takes no class", "--teacher-class"],
+    ),
+    case(
         "a manifest with a field too many",
         |p| p.write("onnx/ddcolor_tiny.toml", "name = \"x\"\nsise = 3\n"),
         "colorize --teacher onnx/ddcolor_tiny.onnx",

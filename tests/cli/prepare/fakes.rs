@@ -3,6 +3,7 @@
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
 use std::process::Command;
 
 use crate::program::{Done, Place};
@@ -46,7 +47,7 @@ if [ -f "$FAKE/wait-$command" ]; then
   exec /bin/sleep 60
 fi
 case $command in
-  feature_extractor) echo "Processed file [1/2]"; echo features > "$database" ;;
+  feature_extractor) echo "Processed file [1/2]"; /bin/cp "$FAKE/database" "$database"; echo features >> "$database" ;;
   *_matcher|matches_importer) echo "Matching image [1/2] in 0.1s"; echo matches >> "$database" ;;
   mapper) echo "Registering image #1 (3)"; /bin/cp -r "$FAKE/models/." "$output" ;;
 esac
@@ -84,6 +85,18 @@ const FFPROBE: &str = r#"#!/bin/sh
 /bin/cat "$FAKE/probe"
 "#;
 
+/// A database without photos; SQLite does not read what follows it.
+fn database(path: &Path) {
+    // As COLMAP keeps it.
+    let tables = "PRAGMA journal_mode = WAL;
+        CREATE TABLE cameras (camera_id, width, height);
+        CREATE TABLE images (image_id, name, camera_id);
+        CREATE TABLE keypoints (image_id, cols, data);
+        CREATE TABLE two_view_geometries (pair_id, rows, data);";
+    let database = rusqlite::Connection::open(path).expect("writable");
+    database.execute_batch(tables).expect("tables");
+}
+
 /// A folder with `photos/`, the photos of the scene, and with fakes of these programs.
 pub fn place_with(programs: &[&str]) -> Place {
     let place = Place::new();
@@ -104,6 +117,7 @@ pub fn place_with(programs: &[&str]) -> Place {
         }
     }
     version(&place, "3.8");
+    database(&place.path("fake/database"));
     place.write("fake/ffmpeg-version", "5.1.9");
     place.write("fake/idet", "TFF: 0 BFF: 0 Progressive: 9 Undetermined: 0");
     piece(&place, 0, &all_views());

@@ -5,6 +5,7 @@ mod film;
 mod folders;
 mod real;
 mod restored;
+mod still;
 
 use std::fs;
 use std::process::Stdio;
@@ -139,7 +140,11 @@ fn what_was_made_is_not_made_again() {
         commands(&place),
         ["feature_extractor", "sequential_matcher", "mapper"]
     );
-    assert_eq!(place.read("house/database.db"), b"features\nmatches\n");
+    assert!(
+        place
+            .read("house/database.db")
+            .ends_with(b"features\nmatches\n")
+    );
     // A photo that the user takes away, or a mask that the user paints.
     fs::remove_file(place.path("house/images/00.png")).expect("a photo");
     let [width, height] = scene::SIZE;
@@ -233,7 +238,7 @@ fn an_interrupt_ends_the_program_that_runs() {
             fs::remove_file(place.path(file)).expect("a file");
         }
     }
-    assert_eq!(place.read("house/database.db"), b"features\n");
+    assert!(place.read("house/database.db").ends_with(b"features\n"));
     commands(&place);
     succeed(&place, &PHOTOS);
     assert_eq!(commands(&place), ALL[1..]);
