@@ -298,6 +298,20 @@ impl Plan {
         self
     }
 
+    /// The same without antialiasing that no trial has confirmed: viewers may show it worse.
+    pub fn confirmed(mut self) -> Self {
+        for decision in &mut self.decisions {
+            if decision.effect == Effect::Antialias && decision.decided_by == Decider::Evidence {
+                decision.decided_by = match decision.on {
+                    true => Decider::Preset,
+                    false => Decider::Evidence,
+                };
+                decision.on = false;
+            }
+        }
+        self
+    }
+
     /// Returns true if an effect is simulated.
     pub fn has(&self, effect: Effect) -> bool {
         (self.decisions.iter()).any(|decision| decision.effect == effect && decision.on)

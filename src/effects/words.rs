@@ -63,6 +63,9 @@ impl fmt::Display for Decision {
             (Decider::Preset, Effect::Robust) => {
                 write!(f, "; a run of {ROBUST_ITERATIONS} iterations could tell")
             }
+            (Decider::Preset, Effect::Antialias) => {
+                f.write_str("; a longer run could try what viewers make of it")
+            }
             // Said already, or what is always done.
             (Decider::Preset, Effect::ChromaDegree) => Ok(()),
             (Decider::Preset, _) => f.write_str("; the preset decides"),

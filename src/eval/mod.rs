@@ -30,7 +30,7 @@ pub use peers::Peer;
 pub use progress::{Observer, Progress, Task};
 pub use reference::{Reference, exposures};
 pub use scene::ColoredScene;
-pub use score::{Scored, Shot, mean_bake, mean_luma, mean_pictures, teacher_colorfulness};
+pub use score::{Scored, Shot, mean_bake, mean_luma, mean_pictures, strengths};
 pub use teacher::MeasuredTeacher;
 
 use crate::{

@@ -110,6 +110,12 @@ impl<'a> Painter<'a> {
         })
     }
 
+    /// What the exported file shows `camera`, RGB in [0, 1], `[height, width]`.
+    pub fn exported(&mut self, camera: &Camera) -> Result<Vec<[f32; 3]>, EvalError> {
+        // Its field comes first after luma's.
+        Ok(self.renderer.render(camera)?.swap_remove(1).shown())
+    }
+
     /// Draws a frame of the path, by its index.
     pub fn draw_frame(&mut self, camera: &Camera, index: usize) -> Result<Drawing, EvalError> {
         let mut drawing = self.draw(camera, &format!("frame {index}"))?;

@@ -293,13 +293,14 @@ pub fn mean_luma(views: &[Scored]) -> LumaScore {
     }
 }
 
-/// Mean colorfulness of the teacher's pictures of all photos.
-pub fn teacher_colorfulness(
-    painter: &Painter<'_>,
+/// Mean colorfulness of the exported file's and of the teacher's pictures of all photos. A teacher
+/// that colors one photo more strongly than the next is not met in a few of them.
+pub fn strengths(
+    painter: &mut Painter<'_>,
     scene: &ColoredScene,
     observe: &mut Observer<'_>,
-) -> Result<Option<f64>, EvalError> {
-    let (mut values, mut done) = (Vec::new(), 0);
+) -> Result<[Option<f64>; 2], EvalError> {
+    let (mut ours, mut teachers, mut done) = (Vec::new(), Vec::new(), 0);
     let views: Vec<usize> = (0..scene.dataset.cameras.len())
         .filter(|&view| painter.answers(view))
         .collect();
@@ -314,12 +315,16 @@ pub fn teacher_colorfulness(
         if let Some(answer) = painter.answer(view)? {
             let layer = Layer::Ab(to_picture(&answer));
             let reference = scene.reference(view, photo);
-            let measures = reference.measures();
-            values.push(measures.then(|| reference.colorfulness(&layer.rgb(&gray_picture(photo)))));
+            if reference.measures() {
+                let shown = painter.exported(&scene.dataset.cameras[view])?;
+                ours.push(Some(reference.colorfulness(&reference.shown(&shown))));
+                let taught = layer.rgb(&gray_picture(photo));
+                teachers.push(Some(reference.colorfulness(&taught)));
+            }
         }
         Ok::<_, EvalError>(())
     })?;
-    Ok(mean(values.into_iter()))
+    Ok([ours, teachers].map(|values| mean(values.into_iter())))
 }
 
 /// Mean over the views of what the export costs.

@@ -324,7 +324,10 @@ impl Fit<'_> {
     ) -> Result<Plan, LumaError> {
         if !self.tries {
             let (room, untried) = (settings.room(), Trials::new());
-            return Ok(self.evidence.decide(room, self.overrules, &untried));
+            return Ok(self
+                .evidence
+                .decide(room, self.overrules, &untried)
+                .confirmed());
         }
         let mut asked = ControlFlow::Continue(());
         let plan = planned(

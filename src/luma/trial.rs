@@ -83,10 +83,10 @@ pub fn planned<E: From<LumaError>>(
     let plan = evidence.decide(room, overrules, &Trials::new());
     let open = evidence.open(&plan);
     if open.is_empty() {
-        return Ok(plan);
+        return Ok(plan.confirmed());
     }
     let Some(photo) = largest_photo(dataset) else {
-        return Ok(plan);
+        return Ok(plan.confirmed());
     };
     let raster = raster()?;
     let beside = match raster.gpu.is_software() {
@@ -99,7 +99,7 @@ pub fn planned<E: From<LumaError>>(
         Some((&open[..asked], size))
     });
     let Some((asked, size)) = sized else {
-        return Ok(plan);
+        return Ok(plan.confirmed());
     };
     let arms = arms(&plan, asked);
     let trial = Trial {
@@ -111,7 +111,7 @@ pub fn planned<E: From<LumaError>>(
         total: size.iterations * arms.len() * size.rounds,
     };
     let gains = trial.gains(&arms, observe)?;
-    Ok(evidence.decide(room, overrules, &gains))
+    Ok(evidence.decide(room, overrules, &gains).confirmed())
 }
 
 /// A plan to compare: without any of the effects in question, or with one of them.

@@ -104,6 +104,9 @@ pub struct Evaluation {
     pub teacher: Option<serde_json::Value>,
     /// Colorfulness of all pictures of the teacher, mean.
     pub teacher_colorfulness: Option<f64>,
+    /// Colorfulness of the exported file's pictures of the same photos, mean.
+    #[serde(default)]
+    pub colorfulness: Option<f64>,
     /// Views measured: `test`, or `train` without held-out ones.
     pub measured_on: String,
     /// Gray pictures against gray photos, mean over these views.
@@ -329,6 +332,12 @@ pub struct ConsistencyScore {
     pub error: Option<f64>,
     /// Its root times 255, in CIELAB units.
     pub rms: Option<f64>,
+    /// `rms` at the teacher's colorfulness, in CIELAB units.
+    ///
+    /// Times the teacher's colorfulness over the method's own, both of `pictures`: as if the
+    /// colors were made as strong. `None` without a teacher.
+    #[serde(default)]
+    pub equal_rms: Option<f64>,
 }
 
 impl ConsistencyScore {
@@ -341,7 +350,16 @@ impl ConsistencyScore {
             values: sum.values(),
             error: sum.error(),
             rms: sum.rms(),
+            equal_rms: None,
         }
+    }
+
+    /// `equal_rms` by the colorfulness of `pictures`.
+    pub fn at_equal_colorfulness(&self, pictures: &[PictureScore]) -> Option<f64> {
+        let strength =
+            |method: &Method| Some(pictures.iter().find(|p| p.method == *method)?.colorfulness);
+        let factor = strength(&Method::Teacher)? / strength(&self.method)?;
+        Some(self.rms? * factor).filter(|_| factor.is_finite())
     }
 }
 
@@ -350,5 +368,31 @@ impl Evaluation {
     pub fn to_json(&self) -> String {
         // Plain structs with string keys: serializing them cannot fail.
         serde_json::to_string_pretty(self).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paler_colors_do_not_agree_better_at_equal_colorfulness() {
+        let painted = |method: &str, colorfulness: f64| {
+            serde_json::from_value(serde_json::json!({
+                "method": method, "colorfulness": colorfulness,
+                "diversity": 1.0, "gray_psnr": 30.0, "sharpness": 1.0,
+            }))
+        };
+        let equal = |rms, own| {
+            let mut score = ConsistencyScore::new(&Method::Exported, &Consistency::default());
+            score.rms = Some(rms);
+            let pictures = [painted("exported", own), painted("teacher", 20.0)];
+            score.at_equal_colorfulness(&pictures.map(|picture| picture.expect("a score")))
+        };
+        assert_eq!(equal(2.0, 20.0), Some(2.0));
+        // Half as strong, and for that alone half as far apart; then farther than that.
+        assert_eq!(equal(1.0, 10.0), Some(2.0));
+        assert_eq!(equal(1.2, 10.0), Some(2.4));
+        assert_eq!(equal(1.0, 0.0), None);
     }
 }

@@ -113,10 +113,16 @@ impl Evaluation {
         }
         let between = self.between.consistency.clone();
         columns.push(("photographed views".to_owned(), between));
+        let cell = |found: Option<&ConsistencyScore>| {
+            let rms = found.and_then(|score| score.rms);
+            match found.and_then(|score| score.equal_rms) {
+                Some(equal) => format!("{} ({equal:.2})", figure(rms, 2)),
+                None => figure(rms, 2),
+            }
+        };
         let rows = self.compared().into_iter().map(|method| {
             let rms = |(_, scores): &(String, Vec<ConsistencyScore>)| {
-                let score = scores.iter().find(|score| score.method == method);
-                figure(score.and_then(|score| score.rms), 2)
+                cell(scores.iter().find(|score| score.method == method))
             };
             let frames = self.path.pictures.iter().find(|one| one.method == method);
             let mut row = vec![method.to_string()];
@@ -135,7 +141,7 @@ impl Evaluation {
             })
             .collect();
         let mut notes = vec![
-            "Root mean square in CIELAB units; colorfulness, gray PSNR (against the gray frames in 8 bits) and sharpness are of the path's frames.".to_owned(),
+            "Root mean square in CIELAB units, in brackets at the teacher's colorfulness; colorfulness, gray PSNR (against the gray frames in 8 bits) and sharpness are of the path's frames.".to_owned(),
             format!(
                 "Pairs of pictures, and how much of them is visible in both: {}.",
                 compared.join(", ")

@@ -5,6 +5,9 @@ use super::{ConsistencyScore, Evaluation, Method, PictureScore};
 /// Ratios between these are no difference worth a word: other views would give as much.
 const ALIKE: [f64; 2] = [0.9, 1.1];
 
+/// Ratios between these are level with a method that colors the same Gaussians for the same views.
+const LEVEL: [f64; 2] = [0.98, 1.02];
+
 /// Ratios from which on something is so many times better.
 const TIMES: f64 = 1.5;
 
@@ -26,17 +29,43 @@ impl Evaluation {
         agreement.chain(rest.into_iter().flatten()).collect()
     }
 
+    /// Agreement at equal colorfulness and a/b error, compared with another way to color.
+    fn recipe(&self, other: &Method) -> Option<String> {
+        let compared = |of: &dyn Fn(&Method) -> Option<f64>, what: &str| {
+            let (ours, theirs) = (of(&Method::Exported)?, of(other)?);
+            let ended = match ours / theirs {
+                ratio if ratio < LEVEL[0] => "a win",
+                ratio if ratio <= LEVEL[1] => "level",
+                _ => "a loss",
+            };
+            Some(format!("{what} {ours:.2} against {theirs:.2}, {ended}"))
+        };
+        let differ = |method: &Method| self.consistency(method)?.equal_rms;
+        let miss = |method: &Method| self.picture(method)?.ab_error;
+        let agreement = compared(&differ, "views differ at equal colorfulness by")?;
+        let error = compared(&miss, "; colors miss the photos' by").unwrap_or_default();
+        Some(format!("beside {other}: {agreement}{error} (CIELAB units)"))
+    }
+
     fn picture(&self, method: &Method) -> Option<&PictureScore> {
         self.pictures.iter().find(|score| score.method == *method)
+    }
+
+    /// Difference between photographed views of one place.
+    fn consistency(&self, method: &Method) -> Option<&ConsistencyScore> {
+        let mut scores = self.between.consistency.iter();
+        scores.find(|score| score.method == *method)
     }
 
     /// Agreement between photographed views, or frames where a method has nothing else, compared
     /// with ours.
     fn agreement(&self, other: &Method) -> Option<String> {
+        if self.peers.iter().any(|peer| peer.method == *other) {
+            return self.recipe(other);
+        }
         let name = match other {
             Method::Exported | Method::Native | Method::Photo => return None,
             Method::Teacher => "the teacher's own pictures",
-            Method::RgbSplats => "RGB splats fitted to these",
             Method::PerFrame => "the teacher frame by frame",
             other => other.name(),
         };
@@ -69,10 +98,9 @@ impl Evaluation {
         Some(format!("{what} agree {} {name} {figures}", times(ratio)))
     }
 
-    /// Colorfulness, compared with the teacher's.
+    /// Colorfulness over all photos, compared with the teacher's.
     fn strength(&self) -> Option<String> {
-        let ours = self.picture(&Method::Exported)?.colorfulness;
-        let theirs = self.picture(&Method::Teacher)?.colorfulness;
+        let (ours, theirs) = (self.colorfulness?, self.teacher_colorfulness?);
         let ratio = ours / theirs;
         if !(ratio.is_finite() && theirs > 0.0) {
             return None;

@@ -20,7 +20,7 @@ use crate::{
     eval::{
         ColoredScene, Detector, EvalError, Lpips, MeasuredTeacher, Painter, Peer, Progress, Scored,
         Source, between_views, exposures, mean_bake, mean_luma, mean_pictures, mean_quality,
-        measure_luma, path_of, teacher_colorfulness,
+        measure_luma, path_of, strengths,
     },
     gpu::Gpu,
     raster::Raster,
@@ -121,10 +121,10 @@ pub fn eval(
     let (views, rows) = measure(&scene, &mut painter, lpips.as_mut(), page, observe)?;
     let output = FlightOutput::begin(page, options.gray_frames.as_deref(), cameras.len());
     let flow = options.flow.as_deref();
-    let (path, flight) = output.draw(&mut painter, &cameras, flow, detector, observe)?;
+    let (mut path, flight) = output.draw(&mut painter, &cameras, flow, detector, observe)?;
     let mut told = |progress: Progress<'_>| observe(Event::from(progress));
-    let between = between_views(&mut painter, &scene, &mut told)?;
-    let teacher_colorfulness = teacher_colorfulness(&painter, &scene, &mut told)?;
+    let mut between = between_views(&mut painter, &scene, &mut told)?;
+    let [colorfulness, teacher_colorfulness] = strengths(&mut painter, &scene, &mut told)?;
     let plain_psnr = match report.luma.settings.antialiased {
         true => mean_quality(&measure_luma(
             &raster,
@@ -136,19 +136,25 @@ pub fn eval(
     };
     let plain_psnr = plain_psnr.and_then(|quality| quality.plain_psnr);
     observe(Event::begins(Stage::Page));
+    let pictures = mean_pictures(views.iter().flat_map(|view| &view.score.pictures));
+    let of_path = path.consistency.iter_mut().map(|entry| &mut entry.score);
+    for score in of_path.chain(&mut between.consistency) {
+        score.equal_rms = score.at_equal_colorfulness(&pictures);
+    }
     let evaluation = Evaluation {
         version: EVALUATION_VERSION,
         program: env!("CARGO_PKG_VERSION").to_owned(),
         scene: scene.name(),
         teacher: painter.teacher(),
         teacher_colorfulness,
+        colorfulness,
         measured_on: scene.dataset.measured().0.to_owned(),
         luma: LumaScore {
             plain_psnr,
             ..mean_luma(&views)
         },
         bake: mean_bake(&views),
-        pictures: mean_pictures(views.iter().flat_map(|view| &view.score.pictures)),
+        pictures,
         views: views.into_iter().map(|scored| scored.score).collect(),
         peers: peers.into_iter().map(|(_, told)| told).collect(),
         rules: Rules::default(),

@@ -157,6 +157,11 @@ fn another_recipe_is_measured_beside_the_scene() {
     assert!(lost.abs() > 0.01 && lost < 1.0, "{theirs} {luma}");
     assert!(kept > 0.9, "{theirs} {luma}");
     assert_eq!(number(&teacher["gray_psnr"]), 100.0);
+    let page = String::from_utf8(place.read("runs/scene/eval/index.html")).expect("text");
+    assert!(
+        page.contains("<li>beside ChromaDistill, code: views differ at equal colorfulness by"),
+        "{page}"
+    );
     // Its splats can be looked at.
     let words = place.succeed(&["info", "runs/scene/eval/chromadistill-code.ply"]);
     assert!(

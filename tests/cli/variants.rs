@@ -72,14 +72,29 @@ fn the_plan_notices_dust() {
     assert_told_apart(Variant::Dust, Variant::DustControl, "robust", &[]);
 }
 
+/// A plain training does what plain viewers show best: none of it is simulated for its own sake.
 #[test]
-fn the_plan_notices_distances() {
-    assert_told_apart(
-        Variant::Distances,
-        Variant::DistancesControl,
-        "antialias",
-        &[],
-    );
+fn distances_are_put_to_a_trial_by_what_viewers_show() {
+    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
+    for (variant, iterations, decided_by) in [
+        (Variant::Distances, "3500", "trial"),
+        // There is no time for a trial.
+        (Variant::Distances, "300", "preset"),
+        (Variant::DistancesControl, "300", "evidence"),
+    ] {
+        let place = Place::new();
+        let name = make(&place, demo, variant);
+        let short = ["--max-side", "160", "--iterations", iterations];
+        let plan = place.json(&[&["plan", &name, "--json"][..], &short].concat());
+        let effects = plan["effects"].as_array().expect("effects");
+        let found = effects.iter().find(|found| found["name"] == "antialias");
+        let found = found.expect("antialias");
+        assert_eq!(found["decided_by"], decided_by, "{found}");
+        assert_eq!(found["on"], false, "{found}");
+        let trial = found["trial"].as_f64();
+        assert!(trial.is_none_or(|gain| gain < -0.3), "{found}");
+        assert_eq!(trial.is_some(), decided_by == "trial");
+    }
 }
 
 #[test]
