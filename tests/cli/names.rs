@@ -32,8 +32,15 @@ fn trained(names: &[&str]) -> Place {
     let place = renamed(names);
     let done = place.run(&QUICK_FIT);
     assert_eq!(done.code, Some(0), "{}", done.stderr);
-    assert!(!done.stderr.contains("warning"), "{}", done.stderr);
+    assert_sound(&done.stderr);
     place
+}
+
+/// Nothing is doubtful but that three iterations show no detail.
+fn assert_sound(stderr: &str) {
+    let mut doubts = stderr.lines().filter(|line| line.starts_with("warning"));
+    let about_names = doubts.find(|line| !line.contains("hardly any of its detail"));
+    assert_eq!(about_names, None, "{stderr}");
 }
 
 #[test]
@@ -113,5 +120,5 @@ fn names_may_be_composed_or_not() {
     );
     let done = place.run(&QUICK_FIT);
     assert_eq!(done.code, Some(0), "{}", done.stderr);
-    assert!(!done.stderr.contains("warning"), "{}", done.stderr);
+    assert_sound(&done.stderr);
 }
