@@ -43,7 +43,7 @@ use crate::{
 const TRIAL_FROM: f64 = 300.0;
 
 /// Share of the textured area that may lose its detail without a word: a draft of 75 aerial photos
-/// loses 0.1, the fog that a draft makes of near-infrared fields 0.67.
+/// loses 0.1, the fog that a draft makes of near-infrared fields 0.5.
 const MUCH_LOST: f64 = 1.0 / 3.0;
 
 /// Input of a training.
