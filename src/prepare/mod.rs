@@ -72,7 +72,7 @@ pub struct Prepared {
     pub masked: usize,
     /// The COLMAP that found the poses.
     pub colmap: String,
-    /// The camera's motion; `None` where no photos match.
+    /// The camera's motion; `None` where no photos match, or more than 300.
     pub motion: Option<Motion>,
     /// Poses and points.
     pub poses: Poses,

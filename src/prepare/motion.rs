@@ -25,6 +25,10 @@ const ZOOMS: f64 = 1.02;
 /// Focal length of a photo of unknown optics, of its longer side: COLMAP's.
 const FOCAL: f64 = 1.2;
 
+/// Photos at most whose camera's motion is found out: equations grow with their square, and
+/// nobody takes more from one place.
+const MOST_PHOTOS: usize = 300;
+
 /// Motion of a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
@@ -97,9 +101,12 @@ pub(super) fn middle([width, height]: [u32; 2]) -> DVec2 {
 }
 
 /// Finds out how the camera moved, or finds rotations for the motion that is `told`; `None`
-/// where no photos match.
+/// where no photos match, or too many.
 pub(super) fn found(matches: &Matches, told: Option<CameraMotion>) -> Option<(Motion, Still)> {
     let (photos, pairs) = connected(matches);
+    if told.is_none() && photos.len() > MOST_PHOTOS {
+        return None;
+    }
     let size = matches.photos[*photos.first()?].size;
     let side = size[0].max(size[1]);
     let at = |photo: usize| photos.binary_search(&photo).ok();

@@ -17,6 +17,9 @@ pub(super) const SIDE: f64 = 640.0;
 /// Matches of a pair that are taken, an even choice: more tell no more about three angles.
 const MOST_MATCHES: usize = 60;
 
+/// Matches of all pairs that are taken: with so many a step takes a tenth of a second.
+const MOST_OF_ALL: usize = 100_000;
+
 /// Steps at most, and the change of the loss, as a share of it, that ends them.
 const STEPS: usize = 60;
 const SETTLED: f64 = 1e-6;
@@ -65,7 +68,8 @@ impl Turned {
             rotations: vec![DMat3::IDENTITY; count],
             focals: vec![focal; count],
         };
-        let fewer: Vec<Seen> = seen.iter().map(Seen::fewer).collect();
+        let most = (MOST_OF_ALL / seen.len().max(1)).clamp(4, MOST_MATCHES);
+        let fewer: Vec<Seen> = seen.iter().map(|seen| seen.fewer(most)).collect();
         let problem = Problem {
             seen: &fewer,
             focal,
@@ -96,7 +100,8 @@ impl Turned {
             .flat_map(|seen| seen.places.iter().map(|places| (seen.photos, places)))
             .map(|(photos, [from, to])| {
                 let moved = self.moved(photos, *from);
-                moved.map_or(f64::INFINITY, |at| scale * at.distance(*to))
+                // A whole picture, where one is behind the camera.
+                moved.map_or(SIDE, |at| (scale * at.distance(*to)).min(SIDE))
             })
             .collect();
         all.sort_by(f64::total_cmp);
@@ -109,8 +114,8 @@ impl Turned {
 }
 
 impl Seen {
-    fn fewer(&self) -> Self {
-        let step = self.places.len().div_ceil(MOST_MATCHES).max(1);
+    fn fewer(&self, most: usize) -> Self {
+        let step = self.places.len().div_ceil(most).max(1);
         Self {
             photos: self.photos,
             places: self.places.iter().step_by(step).copied().collect(),
