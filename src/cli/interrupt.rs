@@ -1,10 +1,9 @@
 //! SIGINT and SIGTERM.
 
 use std::{
-    fmt,
     process::exit,
     sync::{
-        Arc, LazyLock, OnceLock,
+        Arc, OnceLock,
         atomic::{AtomicBool, Ordering},
     },
 };
@@ -12,13 +11,8 @@ use std::{
 use super::CliError;
 use crate::{disk, programs, run::RunError, store::Interrupt};
 
-/// The statuses with which a shell expects a program to end that was interrupted, and one that was
-/// told to end.
-const INTERRUPTED: i32 = 130;
-const TERMINATED: i32 = 143;
-
-/// True if the signal was SIGTERM.
-static TOLD_TO_END: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+/// A shell reports a program that signal N ended by this and N.
+const BASE_STATUS: i32 = 128;
 
 /// Interrupt flag that a signal raises, where it does not end the program.
 static HEEDED: OnceLock<Arc<Interrupt>> = OnceLock::new();
@@ -27,32 +21,39 @@ static HEEDED: OnceLock<Arc<Interrupt>> = OnceLock::new();
 static ENDS_WELL: AtomicBool = AtomicBool::new(false);
 
 /// Lets signals end the program without leaving files behind that were only begun.
+#[cfg(unix)]
 pub(super) fn heed_signals() -> Result<(), CliError> {
-    let handled = ctrlc::set_handler(|| {
-        if HEEDED.get().is_some_and(|interrupt| interrupt.raise()) {
-            eprintln!("writing a checkpoint; once more ends at once");
-            return;
-        }
-        // Before their files are removed.
-        let _no_program = programs::end_all();
-        let _nothing_new = disk::give_up();
-        exit(match ENDS_WELL.load(Ordering::SeqCst) {
-            true => 0,
-            false if TOLD_TO_END.load(Ordering::SeqCst) => TERMINATED,
-            false => INTERRUPTED,
-        });
-    });
-    let failed = |error: &dyn fmt::Display| RunError::Signals(error.to_string());
-    handled.map_err(|error| failed(&error))?;
-    #[cfg(unix)]
-    {
-        use signal_hook::{consts, flag::register};
-        // The handler above is called as before.
-        register(consts::SIGTERM, TOLD_TO_END.clone()).map_err(|error| failed(&error))?;
-        // Whoever writes too large a file is told so, and does not die of it.
-        register(consts::SIGXFSZ, Arc::default()).map_err(|error| failed(&error))?;
-    }
+    use signal_hook::{consts, flag, iterator::Signals};
+    let failed = |error: std::io::Error| RunError::Signals(error.to_string());
+    // Whoever writes too large a file is told so, and does not die of it.
+    flag::register(consts::SIGXFSZ, Arc::default()).map_err(failed)?;
+    let mut signals =
+        Signals::new([consts::SIGINT, consts::SIGTERM, consts::SIGHUP]).map_err(failed)?;
+    std::thread::spawn(move || signals.forever().for_each(heed));
     Ok(())
+}
+
+/// Lets Ctrl-C end the program without leaving files behind that were only begun.
+#[cfg(not(unix))]
+pub(super) fn heed_signals() -> Result<(), CliError> {
+    const INTERRUPTED: i32 = 2;
+    ctrlc::set_handler(|| heed(INTERRUPTED))
+        .map_err(|error| RunError::Signals(error.to_string()).into())
+}
+
+/// Ends the program, or lets it end at its next checkpoint.
+fn heed(signal: i32) {
+    if HEEDED.get().is_some_and(|interrupt| interrupt.raise()) {
+        eprintln!("writing a checkpoint; once more ends at once");
+        return;
+    }
+    // Before their files are removed.
+    let _no_program = programs::end_all();
+    let _nothing_new = disk::give_up();
+    exit(match ENDS_WELL.load(Ordering::SeqCst) {
+        true => 0,
+        false => BASE_STATUS + signal,
+    });
 }
 
 /// Interrupt flag that the first signal raises from now on, where the work can be saved.
