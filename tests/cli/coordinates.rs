@@ -124,6 +124,7 @@ fn exported_files_come_back_to_their_photos() {
 
 /// Georeferenced: where the steps of `f32` are half a unit.
 #[test]
+#[ignore = "three trainings; others train away from the origin: make test-all"]
 fn utm_coordinates_train_like_those_at_the_origin() {
     let utm = [512_345.25, 5_403_210.5, 321.0];
     let [near, far] = [[0.0; 3], utm].map(|offset| {

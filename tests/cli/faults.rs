@@ -111,7 +111,6 @@ fn render_and_eval_fail_well(steps: Steps) {
 #[test]
 fn some_writes_of_a_run_fail_well() {
     fit_fails_well(Steps::Some);
-    colorize_fails_well(Steps::Some);
 }
 
 #[test]

@@ -27,6 +27,7 @@ fn solved(settings: &ChromaSettings, luma: &Splats, views: &[ChromaView]) -> ShF
 /// Results are equal if all views stay on the device, some, or none, and if targets wait in memory
 /// or in a file.
 #[test]
+#[ignore = "25 to 40 seconds; the program colors within a memory limit elsewhere: make test-all"]
 fn results_do_not_depend_on_the_budget() {
     let (luma, views) = (wall(), six_views());
     let within = |limit, host| {
