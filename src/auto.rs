@@ -3,6 +3,10 @@
 //! A step's result is there when it was made from the same files and options before:
 //! `auto.json` in the output folder keeps what each was made from.
 
+pub(crate) mod outcome;
+mod page;
+pub(crate) mod reel;
+
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
@@ -14,7 +18,7 @@ use serde_json::json;
 use crate::{
     capture::{Film, IMAGES},
     chroma::teacher::{Teacher, TeacherSettings},
-    prepare::{PrepareError, PrepareOptions, digest, digest_of, prepare},
+    prepare::{CameraMotion, PrepareError, PrepareOptions, digest, digest_of, prepare},
     run::{
         ColorizeRequest, EvalOptions, ExportOptions, FitRequest, FramesOptions, Preset, RunError,
         TeachOptions, colorize, eval, export, fit, frames,
@@ -31,6 +35,7 @@ const KEPT: &str = "auto.json";
 /// Frames of the page's path.
 const PATH: usize = 60;
 
+#[derive(Clone)]
 pub struct AutoOptions {
     /// Options of the preparation; its output is ignored.
     pub prepare: PrepareOptions,
@@ -44,6 +49,8 @@ pub struct AutoOptions {
     pub hints: Option<PathBuf>,
     /// Length of the training; by the device by default.
     pub preset: Option<Preset>,
+    /// Frames a second of the film in color; by default those of the film.
+    pub frame_rate: Option<[u32; 2]>,
     /// Interrupt flag of training and coloring, after which they can continue.
     pub interrupt: Arc<Interrupt>,
 }
@@ -90,6 +97,8 @@ impl Step {
 
 /// Event of a run of `auto`.
 pub enum AutoEvent {
+    /// A shot begins: its number, the count of shots, and its time.
+    Shot(usize, usize, String),
     /// A step begins, and goes through these stages.
     Begins(Step, Vec<Stage>),
     /// A step's result exists already.
@@ -122,6 +131,8 @@ pub struct Results {
     pub house: PathBuf,
     /// The run folder.
     pub run: PathBuf,
+    /// Motion of the camera; `None` if not known.
+    pub camera: Option<CameraMotion>,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -154,9 +165,12 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         .with(input, "an original")
         .keep();
     check(options)?;
-    let house = prepared(options, tell)?;
+    let (house, camera) = prepared(options, tell)?;
     let run = RunFolder::at(&options.output.join(OF_AUTO));
-    let results = results(options, &house, &run)?;
+    let results = Results {
+        camera,
+        ..results(options, &house, &run)?
+    };
     let mut steps = Steps {
         kept: StepRecords::read(&options.output)?,
         tell,
@@ -211,12 +225,19 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         },
     )?;
 
-    let from = digest_of(&[&digest(&run.chroma())?, &digest(&run.color())?]);
+    let from = digest_of(&[
+        &digest(&run.chroma())?,
+        &digest(&run.color())?,
+        &*options
+            .frame_rate
+            .map_or(String::new(), |rate| format!("{rate:?}")),
+    ]);
     let asked = FramesOptions {
         run: Some(run.path().to_owned()),
         teacher: Some(options.teacher.clone()),
         teacher_settings: options.teacher_settings.clone(),
         output: results.colored.clone(),
+        frame_rate: options.frame_rate,
         hints: options.hints.clone(),
         ..FramesOptions::default()
     };
@@ -291,15 +312,19 @@ fn results(options: &AutoOptions, house: &Path, run: &RunFolder) -> Result<Resul
         contact_sheet: run.contact_sheet(),
         house: house.to_owned(),
         run: run.path().to_owned(),
+        camera: None,
     })
 }
 
 /// The folder of photos and poses. One that COLMAP has been through needs nothing.
-fn prepared(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<PathBuf, AutoError> {
+fn prepared(
+    options: &AutoOptions,
+    tell: &mut Teller<'_>,
+) -> Result<(PathBuf, Option<CameraMotion>), AutoError> {
     let input = &options.prepare.input;
     if input.join(IMAGES).is_dir() && input.join("sparse").is_dir() {
         tell(AutoEvent::Skips(Step::Prepare));
-        return Ok(input.clone());
+        return Ok((input.clone(), None));
     }
     // It knows by itself what is there.
     tell(AutoEvent::Begins(Step::Prepare, Vec::new()));
@@ -307,8 +332,8 @@ fn prepared(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<PathBuf, Aut
         output: options.output.join("house"),
         ..options.prepare.clone()
     };
-    prepare(&asked, &mut |event| tell(AutoEvent::Event(event)))?;
-    Ok(asked.output)
+    let made = prepare(&asked, &mut |event| tell(AutoEvent::Event(event)))?;
+    Ok((asked.output, made.motion.map(|motion| motion.camera)))
 }
 
 /// Steps, of which those are skipped whose results are there.

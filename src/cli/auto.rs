@@ -16,13 +16,26 @@ use super::{
     values::{PRESETS, folder, one_of},
 };
 use crate::{
-    auto::{AutoEvent, AutoOptions, Results, Step, auto},
+    auto::{
+        AutoEvent, AutoOptions, Results, Step, auto,
+        outcome::{Fallback, Outcome, Reel, ReelShot},
+        reel,
+    },
     run::Preset,
 };
 
+const FALLBACKS: &[(Fallback, &str)] = &[
+    (Fallback::Gray, "Its frames stay gray [default]"),
+    (
+        Fallback::Teacher,
+        "The teacher's, steadied from frame to frame",
+    ),
+];
+
 /// Do everything: from a film or photos to a colored scene, colored photos and a page.
 ///
-/// Runs prepare, fit, colorize, frames, export and eval. Steps whose result is there are skipped,
+/// Runs prepare, fit, colorize, frames, export and eval. Of a film with several shots each becomes
+/// a scene of its own, and all become one film; --shot or --start chooses one. Steps whose result is there are skipped,
 /// so the same command continues after an interruption.
 #[derive(Args)]
 #[command(after_long_help = "Example:
@@ -43,6 +56,9 @@ pub struct Auto {
     /// Folder of painted strokes, as for colorize.
     #[arg(long, help_heading = TEACHER, value_name = "DIR")]
     hints: Option<PathBuf>,
+    /// Colors of a shot whose scene cannot be found, in a film of several.
+    #[arg(long, help_heading = TEACHER, value_parser = one_of(FALLBACKS), default_value = "gray", hide_default_value = true, value_name = "HOW")]
+    fallback: Fallback,
     /// How much work to do [default: paper on a GPU, else draft].
     #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
@@ -61,11 +77,17 @@ impl Auto {
             teacher_settings: self.network.settings(),
             hints: self.hints,
             preset: self.preset,
+            frame_rate: None,
             interrupt: interrupt(),
         };
         let mut whole = Progress::default();
         let mut progress = Progress::default();
-        let results = auto(&options, &mut |told| match told {
+        let fallback = self.fallback;
+        let mut tell = |told: AutoEvent| match told {
+            AutoEvent::Shot(number, of, span) => {
+                whole.join(&mut progress);
+                eprintln!("shot {number} of {of}, {span}");
+            }
             AutoEvent::Begins(step, stages) => {
                 whole.join(&mut progress);
                 eprintln!("{}", heading(step, ""));
@@ -76,7 +98,17 @@ impl Auto {
                 eprintln!("{}", heading(step, ": its result is there"));
             }
             AutoEvent::Event(event) => progress.show(&event),
-        })?;
+        };
+        if let Some(film) = reel::shots_of(&options, &mut tell)? {
+            let made = reel::reel(&options, fallback, &film, &mut tell)?;
+            whole.join(&mut progress);
+            if self.json {
+                return print(serde_json::to_string_pretty(&made).unwrap_or_default());
+            }
+            print(of_reel(&made))?;
+            return whole.close(&[], &next::look(&made.page));
+        }
+        let results = auto(&options, &mut tell)?;
         whole.join(&mut progress);
         if self.json {
             let text = serde_json::to_string_pretty(&results);
@@ -92,6 +124,20 @@ fn heading(step: Step, more: &str) -> String {
     let place = Step::ALL.iter().position(|&other| other == step);
     let (place, of) = (place.unwrap_or_default() + 1, Step::ALL.len());
     format!("step {place} of {of}, {}{more}", step.command())
+}
+
+/// Summary of a film of several shots.
+fn of_reel(made: &Reel) -> String {
+    let colored = |shot: &&ReelShot| matches!(shot.outcome, Outcome::Scene(_));
+    let blank = |shot: &&ReelShot| matches!(shot.outcome, Outcome::Blank);
+    let blank = made.shots.iter().filter(blank).count();
+    format!(
+        "{} of {} shots have a scene\n{}  the film in color\n{}  its shots",
+        made.shots.iter().filter(colored).count(),
+        made.shots.len() - blank,
+        made.colored.display(),
+        made.page.display()
+    )
 }
 
 /// Paths of the results, a line each.

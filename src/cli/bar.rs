@@ -2,7 +2,12 @@
 
 use std::{
     fmt,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    io::{self, Write},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        mpsc::{RecvTimeoutError, Sender, channel},
+    },
+    thread,
     time::{Duration, Instant},
 };
 
@@ -24,10 +29,15 @@ const MEMORY: f64 = 15.0;
 /// Redraw interval where no progress is reported.
 const TICK: Duration = Duration::from_millis(250);
 
-/// Progress line on standard error; hidden where that is no terminal.
+/// Interval of lines where standard error is no terminal.
+const LINE: Duration = Duration::from_secs(60);
+
+/// Progress line on standard error; where that is no terminal, a line a minute.
 pub(super) struct Bar {
     shown: ProgressBar,
     state: Arc<Mutex<BarText>>,
+    /// Ends the lines when it is dropped.
+    _lines: Option<Sender<()>>,
 }
 
 impl Bar {
@@ -44,7 +54,16 @@ impl Bar {
             .with_key("line", line);
         let shown = ProgressBar::new_spinner().with_style(style);
         shown.enable_steady_tick(TICK);
-        Self { shown, state }
+        let say = |line: String| {
+            // Nobody may listen any more.
+            let _ = writeln!(io::stderr(), "{line}");
+        };
+        let lines = (shown.is_hidden()).then(|| in_lines(state.clone(), LINE, say));
+        Self {
+            shown,
+            state,
+            _lines: lines,
+        }
     }
 
     /// So many steps of so many are done; of 0 where they are not counted.
@@ -78,6 +97,21 @@ impl Drop for Bar {
     fn drop(&mut self) {
         self.shown.abandon();
     }
+}
+
+/// Says after every `interval` how far something has come, until the sender is dropped.
+fn in_lines(
+    state: Arc<Mutex<BarText>>,
+    interval: Duration,
+    say: impl Fn(String) + Send + 'static,
+) -> Sender<()> {
+    let (sender, ended) = channel();
+    thread::spawn(move || {
+        while let Err(RecvTimeoutError::Timeout) = ended.recv_timeout(interval) {
+            say(locked(&state).plain(Instant::now()));
+        }
+    });
+    sender
 }
 
 /// Whoever panicked while drawing leaves a state that can be drawn.
@@ -136,6 +170,21 @@ impl BarText {
     fn seconds_each(&self) -> Option<f64> {
         let [steps, seconds] = self.pace;
         (steps > 0.0 && seconds > 0.0).then(|| seconds / steps)
+    }
+
+    /// The line without a bar.
+    fn plain(&self, now: Instant) -> String {
+        let elapsed = duration((now - self.begun).as_secs_f64());
+        let counts = match self.total {
+            0 => String::new(),
+            total => format!(" {}/{total}", self.done),
+        };
+        let message = match self.message.is_empty() {
+            true => String::new(),
+            false => format!(", {}", self.message),
+        };
+        let line = format!("{}{counts} after {elapsed}{message}", self.name);
+        truncate_str(&line, WIDTH, "…").into_owned()
     }
 
     /// The line as it is now.
@@ -216,6 +265,30 @@ mod tests {
             self.state
                 .line(self.begun + Duration::from_secs_f64(seconds))
         }
+    }
+
+    #[test]
+    fn without_a_terminal_there_are_lines_until_it_ends() {
+        let begun = Instant::now();
+        let mut text = BarText::new("mapping", None, begun);
+        let later = begun + Duration::from_secs(65);
+        assert_eq!(text.plain(later), "mapping after 1:05");
+        text.update(3, 30, "0003.png".to_owned(), later);
+        assert_eq!(text.plain(later), "mapping 3/30 after 1:05, 0003.png");
+        let (said, lines) = channel();
+        let state = Arc::new(Mutex::new(text));
+        let ends = in_lines(state, Duration::from_millis(5), move |line| {
+            let _ = said.send(line);
+        });
+        let patience = Duration::from_secs(20);
+        for _ in 0..2 {
+            let line = lines.recv_timeout(patience).expect("a line");
+            assert!(line.starts_with("mapping 3/30 after "), "{line}");
+        }
+        drop(ends);
+        while lines.recv_timeout(patience).is_ok() {}
+        // Its end is heard.
+        assert!(lines.recv().is_err());
     }
 
     #[test]

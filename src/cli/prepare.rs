@@ -59,6 +59,9 @@ pub struct InputArguments {
     /// Length of the shot, instead of --end.
     #[arg(long, help_heading = INPUT, value_name = "SECONDS", value_parser = positive::<f64>, requires = "start", conflicts_with = "end")]
     seconds: Option<f64>,
+    /// Number of the shot, from 1, instead of --start.
+    #[arg(long, help_heading = INPUT, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), conflicts_with = "start")]
+    shot: Option<u16>,
     /// Frames per second that get a pose, the sharpest of their time [default: 2, 30 to 120 in all].
     #[arg(long, help_heading = INPUT, value_name = "N", value_parser = positive::<f64>)]
     per_second: Option<f64>,
@@ -106,6 +109,8 @@ impl InputArguments {
             output,
             start: self.start,
             end: self.end.or(length.map(|(start, seconds)| start + seconds)),
+            shot: self.shot.map(usize::from),
+            known_shots: None,
             per_second: self.per_second,
             mask: self.mask,
             masks: self.masks,

@@ -12,6 +12,7 @@ mod canvas;
 mod finish;
 mod painted;
 mod scene;
+mod steady;
 mod window;
 
 pub use between::{Between, ColoredPhoto};
@@ -20,3 +21,4 @@ pub use canvas::Canvas;
 pub use finish::{Colored, finish};
 pub use painted::Strokes;
 pub use scene::{SceneDrawer, ViewOf, believable};
+pub use steady::Steadied;

@@ -37,6 +37,56 @@ pub(super) fn probe(input: &Path) -> Result<FilmSource, PrepareError> {
     FilmSource::probe(input)
 }
 
+/// Shots of a film.
+#[derive(Clone, Debug)]
+pub(crate) struct FilmShots {
+    /// From when to when each lasts, in seconds.
+    pub shots: Vec<[f64; 2]>,
+    /// Duration of the film, in seconds.
+    pub seconds: f64,
+    /// Frames a second.
+    pub frame_rate: [u32; 2],
+}
+
+impl FilmShots {
+    /// A film whose shots are not looked for.
+    ///
+    /// # Errors
+    /// [`PrepareError`]: FFmpeg is missing or too old, or the file is no film.
+    pub fn probe(input: &Path) -> Result<Self, PrepareError> {
+        let source = probe(input)?;
+        Ok(Self {
+            shots: Vec::new(),
+            seconds: source.seconds,
+            frame_rate: source.frame_rate,
+        })
+    }
+}
+
+/// Finds the shots of a film.
+///
+/// # Errors
+/// [`PrepareError`]: FFmpeg is missing or too old, or the file is no film.
+pub(crate) fn film_shots(
+    input: &Path,
+    observe: &mut Observer<'_>,
+) -> Result<FilmShots, PrepareError> {
+    let source = probe(input)?;
+    let whole = Part {
+        start: 0.0,
+        seconds: None,
+    };
+    let total = source.seconds.ceil().max(1.0) as usize;
+    let shots = source.shots(whole, false, &mut |seen| {
+        count(observe, Stage::Cuts, seen as usize, total);
+    })?;
+    Ok(FilmShots {
+        shots,
+        seconds: source.seconds,
+        frame_rate: source.frame_rate,
+    })
+}
+
 /// Makes `frames/`, `film.json` and `images/`; the shots of the film, where they were looked for.
 ///
 /// # Errors
@@ -49,12 +99,20 @@ pub(super) fn frames(
 ) -> Result<Vec<[f64; 2]>, PrepareError> {
     let same_film = of(&["film", &digest(&source.path)?]);
     let time = |time: Option<f64>| time.map_or(String::new(), |time| time.to_string());
-    let from = of(&[
-        "frames",
-        &same_film,
-        &time(options.start),
-        &time(options.end),
-    ]);
+    let mut parts = vec![
+        "frames".to_owned(),
+        same_film.clone(),
+        time(options.start),
+        time(options.end),
+    ];
+    if let Some(shot) = options.shot {
+        let span = options
+            .known_shots
+            .as_ref()
+            .and_then(|known| known.get(shot - 1));
+        parts.push(format!("shot {shot} {span:?}"));
+    }
+    let from = of(&parts);
     if !state.is_done(Step::Frames, &from) {
         for result in [FRAMES, FILM, IMAGES] {
             state.check_own(result)?;
@@ -89,8 +147,9 @@ fn choose(
     let seconds = asked.seconds.unwrap_or(source.seconds - start);
     let total = seconds.ceil().max(1.0) as usize;
     let chosen = options.start.is_some() || options.end.is_some();
-    let shots = match state.shots(same_film) {
-        Some(known) if !chosen => known.to_vec(),
+    let shots = match (&options.known_shots, state.shots(same_film)) {
+        (Some(known), _) => known.clone(),
+        (None, Some(known)) if !chosen => known.to_vec(),
         _ => {
             let only_first = chosen && options.end.is_none();
             let found = source.shots(asked, only_first, &mut |seen| {
@@ -110,6 +169,17 @@ fn choose(
         start: (from - half).max(0.0),
         seconds: Some(to - from - if from < half { half } else { 0.0 }),
     };
+    if let Some(number) = options.shot {
+        let count = shots.len();
+        let Some(&shot) = shots.get(number - 1) else {
+            return Err(no_film(format!("has {count} shots, and no shot {number}")));
+        };
+        let span = span(shot);
+        observe(Event::Note(format!(
+            "using shot {number} of {count}, {span}"
+        )));
+        return Ok(exactly(shot));
+    }
     let Some(longest) = shots
         .iter()
         .max_by(|a, b| length(a).total_cmp(&length(b)).then(b[0].total_cmp(&a[0])))
@@ -121,7 +191,7 @@ fn choose(
     if !chosen {
         if shots.len() > 1 {
             observe(Event::Note(format!(
-                "{} shots; using the longest, {}; choose another by its start: {}",
+                "{} shots; using the longest, {}; choose another by its number or start: {}",
                 shots.len(),
                 span(*longest),
                 list(&shots)
@@ -314,18 +384,19 @@ fn clock(seconds: f64) -> String {
     }
 }
 
-fn span([from, to]: [f64; 2]) -> String {
+pub fn span([from, to]: [f64; 2]) -> String {
     format!("{} to {}", clock(from), clock(to))
 }
 
-/// The longest shots in the order of the film.
+/// The longest shots in the order of the film, with their numbers.
 fn list(shots: &[[f64; 2]]) -> String {
-    let mut longest = shots.to_vec();
-    longest.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
+    let mut longest: Vec<(usize, [f64; 2])> = shots.iter().copied().enumerate().collect();
+    longest.sort_by(|(_, a), (_, b)| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
     let left_out = longest.len().saturating_sub(TOLD_SHOTS);
     longest.truncate(TOLD_SHOTS);
-    longest.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let mut told: Vec<String> = longest.into_iter().map(span).collect();
+    longest.sort_by_key(|&(place, _)| place);
+    let numbered = |(place, shot)| format!("{}: {}", place + 1, span(shot));
+    let mut told: Vec<String> = longest.into_iter().map(numbered).collect();
     if left_out > 0 {
         told.push(format!("and {left_out} shorter ones"));
     }
@@ -348,7 +419,7 @@ mod tests {
     fn the_longest_shots_are_listed() {
         assert_eq!(
             list(&[[0.0, 2.0], [2.0, 9.5]]),
-            "0:00.00 to 0:02.00, 0:02.00 to 0:09.50"
+            "1: 0:00.00 to 0:02.00, 2: 0:02.00 to 0:09.50"
         );
         let many: Vec<[f64; 2]> = (0..20)
             .map(|n| [f64::from(n), f64::from(n) + 0.1 * f64::from(n)])

@@ -34,6 +34,7 @@ use std::{
 use serde::Serialize;
 
 pub use error::PrepareError;
+pub(crate) use film::{FilmShots, film_shots, span};
 pub use motion::{CameraMotion, Motion};
 pub use options::{Cameras, Matching, PrepareOptions};
 pub use poses::Poses;
@@ -128,6 +129,21 @@ pub fn prepare(
     })
 }
 
+/// Makes only the frames of a film's shot: `frames/`, `film.json` and `images/`.
+///
+/// # Errors
+/// [`PrepareError`].
+pub(crate) fn prepare_frames(
+    options: &PrepareOptions,
+    observe: &mut Observer<'_>,
+) -> Result<(), PrepareError> {
+    let input = fs::canonicalize(&options.input).map_err(files::at(&options.input))?;
+    let output = path::absolute(&options.output).map_err(files::at(&options.output))?;
+    let source = film::probe(&input)?;
+    let mut state = OutputState::open(&output, &input, options)?;
+    film::frames(&mut state, options, &source, observe).map(drop)
+}
+
 /// Does every step whose result is not there.
 fn make(
     state: &mut OutputState,
@@ -213,12 +229,13 @@ fn check_apart(options: &PrepareOptions, input: &Path, output: &Path) -> Result<
 
 /// Refuses for photos what is said about films.
 fn check_film_options(options: &PrepareOptions) -> Result<(), PrepareError> {
-    match options.start.or(options.end).or(options.per_second) {
-        Some(_) => Err(PrepareError::at(
+    let of_shot = options.start.or(options.end).or(options.per_second);
+    match of_shot.is_some() || options.shot.is_some() {
+        true => Err(PrepareError::at(
             &options.input,
-            "is a folder of photos; start, end and frames a second are for films",
+            "is a folder of photos; start, end, shot and frames a second are for films",
         )),
-        None => Ok(()),
+        false => Ok(()),
     }
 }
 

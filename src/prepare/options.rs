@@ -34,6 +34,12 @@ pub struct PrepareOptions {
     pub start: Option<f64>,
     /// End of the shot, in seconds; the next cut by default.
     pub end: Option<f64>,
+    /// Number of the shot in the film, from 1, in place of its start.
+    #[serde(skip)]
+    pub shot: Option<usize>,
+    /// From when to when each shot of the film lasts, in seconds, where that is known.
+    #[serde(skip)]
+    pub known_shots: Option<Vec<[f64; 2]>>,
     /// Frames a second that get a pose; 30 to 120 in all by default.
     pub per_second: Option<f64>,
     /// A mask for all photos.

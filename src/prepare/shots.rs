@@ -13,9 +13,17 @@ const EMPTY: f32 = 2.5;
 /// turns stays below 0.1 at this size, and frames of two shots have little in common.
 const CUT: f32 = 0.15;
 
-/// And frames at a cut differ by so many times as much as those around it, so that a camera
-/// that sweeps across is not cut into pieces.
+/// And frames at a cut differ by so many times as much as those around it usually do, so that a
+/// camera that sweeps across is not cut into pieces.
 const STANDS_OUT: f32 = 5.0;
+
+/// Frames that have next to nothing in common, and by how many times they then stand out: where
+/// frames jump, none can differ five times as much.
+const NOTHING_IN_COMMON: [f32; 2] = [0.6, 2.0];
+
+/// Rank of the usual difference among those around, smallest first: where frames are shown twice
+/// or three times most of these are zero.
+const USUAL: f32 = 0.8;
 
 /// So many frames to either side are around a cut.
 const AROUND: usize = 12;
@@ -134,8 +142,12 @@ fn is_cut(differences: &[f32], empty: &[bool], at: usize) -> bool {
     let others = around.filter(|&other| other != at && shows(other));
     let mut others: Vec<f32> = others.map(|other| differences[other]).collect();
     others.sort_by(f32::total_cmp);
-    let usual = others.get(others.len() / 2).copied().unwrap_or(0.0);
-    differences[at] > CUT && (!shows(at) || differences[at] > STANDS_OUT * usual)
+    let rank = (USUAL * others.len() as f32) as usize;
+    let usual = others.get(rank).copied().unwrap_or(0.0);
+    let [unlike, stands_out] = NOTHING_IN_COMMON;
+    let found = differences[at];
+    let is_alone = found > STANDS_OUT * usual || (found > unlike && found > stands_out * usual);
+    found > CUT && (!shows(at) || is_alone)
 }
 
 #[cfg(test)]
@@ -181,6 +193,19 @@ mod tests {
         assert_eq!(shots_of(flash), [[0, 50]]);
         let torn = (0..50).map(|n| frame(if n == 25 { 4 } else { 2 }, n, 1.0));
         assert_eq!(shots_of(torn), [[0, 50]]);
+    }
+
+    #[test]
+    fn held_and_jumping_frames_are_cut_where_the_scene_changes() {
+        let held = (0..60).map(|n| frame(2 * usize::from(n >= 30), 6 * (n / 3), 1.0));
+        assert_eq!(shots_of(held), [[0, 30], [30, 60]]);
+        // Every frame differs by more than a cut's least.
+        let jumping: Vec<_> = (0..40)
+            .map(|n| frame(2 * usize::from(n >= 20), 8 * n, 1.0))
+            .collect();
+        let usual = difference(&shape(&jumping[0]), &shape(&jumping[1]));
+        assert!((CUT..0.5).contains(&usual), "{usual}");
+        assert_eq!(shots_of(jumping), [[0, 20], [20, 40]]);
     }
 
     #[test]

@@ -31,6 +31,7 @@ pub use export_clean::Cleaned;
 pub use export_viewer::ViewerCameras;
 pub use fit::{FitRequest, Init, fit};
 pub use frames::{Frames, FramesOptions, frames};
+pub(crate) use frames::{PlainFramesOptions, frames_without_scene};
 pub use info::info;
 pub use loss::Loss;
 pub use merge::{MergeOptions, merge};

@@ -1,11 +1,14 @@
 //! A film of pictures, by ffmpeg.
 
+mod join;
 mod sound;
 
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
 use sound::{Sound, in_container};
+
+pub(crate) use join::Piece;
 
 use super::files;
 use crate::{

@@ -6,6 +6,9 @@ mod painter;
 mod range;
 mod shots;
 mod unplaced;
+mod without_scene;
+
+pub(crate) use without_scene::{PlainFramesOptions, frames_without_scene};
 
 use std::{cell::RefCell, path::PathBuf};
 

@@ -4,6 +4,7 @@ mod fakes;
 mod film;
 mod folders;
 mod real;
+mod reel;
 mod restored;
 mod still;
 

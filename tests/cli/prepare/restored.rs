@@ -66,7 +66,7 @@ fn film(place: &Place) {
 }
 
 /// Streams of a film of a kind, `v` or `a`, by `ffprobe`.
-fn streams(place: &Place, film: &str, kind: &str) -> Value {
+pub(super) fn streams(place: &Place, film: &str, kind: &str) -> Value {
     let said = Command::new("ffprobe")
         .args(["-v", "error", "-count_frames", "-of", "json"])
         .args(["-select_streams", kind, "-show_entries"])
