@@ -73,7 +73,7 @@ def consistency(scene: str, found: dict) -> list[list[str]]:
         scores = [far[r].get(method) for r in RANGES]
         if not any(scores):
             continue
-        cells = [figure(squared(score), 6) for score in scores]
+        cells = [figure(squared(score), 8) for score in scores]
         for r, score in zip(RANGES, scores):
             cells.append(figure(ratio(score, far[r].get(BASELINE), "error"), 2))
         cells += [figure(score and score["rms"], 2) for score in scores]
@@ -99,7 +99,7 @@ def ablations(scene: str, found: dict) -> list[list[str]]:
     for with_it, method, without, other in ABLATIONS:
         if method in pictures and other in pictures:
             for name, of in [(with_it, method), (without, other)]:
-                errors = [figure(squared(far[r].get(of)), 6) for r in RANGES]
+                errors = [figure(squared(far[r].get(of)), 8) for r in RANGES]
                 picture = pictures[of]
                 colors = [figure(picture["colorfulness"], 1), figure(picture["ab_error"], 2)]
                 rows.append([scene, name, *errors, *colors])

@@ -118,12 +118,21 @@ pub fn plan_by(
         .filter(|&(pull, _)| pull >= settings.pull_threshold)
         .collect();
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    // A split or a clone adds one.
-    let taken = evidence.held + evidence.reserved + survivors.len();
-    let room = settings.max_splats.saturating_sub(taken);
+    let remain = |i: usize| stays(&survivor(i));
+    let kept = survivors.iter().filter(|&&i| remain(i)).count();
+    let taken = evidence.held + evidence.reserved + kept;
+    let mut room = settings.max_splats.saturating_sub(taken);
     let growth = (survivors.len() as f64 * settings.growth).ceil() as usize;
-    candidates.truncate(room.min(growth));
-    let mut splits: Vec<usize> = candidates.into_iter().map(|(_, i)| i).collect();
+    candidates.truncate(growth);
+    // Division adds one, or two to what would go undivided.
+    let fits = |i: &usize| {
+        let added = if remain(*i) { 1 } else { 2 };
+        let fits = added <= room;
+        room = room.saturating_sub(added);
+        fits
+    };
+    let divisible = candidates.into_iter().map(|(_, i)| i);
+    let mut splits: Vec<usize> = divisible.take_while(fits).collect();
     splits.sort_unstable();
 
     let mut plan: Vec<Descent> = survivors

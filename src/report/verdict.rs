@@ -11,6 +11,9 @@ const LEVEL: [f64; 2] = [0.98, 1.02];
 /// Ratios from which on something is so many times better.
 const TIMES: f64 = 1.5;
 
+/// Colorfulness below which it rounds to nothing.
+const COLORLESS: f64 = 0.05;
+
 /// ΔE00 below which nobody sees a difference, and below which one has to look for it.
 const UNSEEN: f64 = 1.0;
 const FAINT: f64 = 2.0;
@@ -69,6 +72,14 @@ impl Evaluation {
             Method::PerFrame => "the teacher frame by frame",
             other => other.name(),
         };
+        let colorful = |method: &Method| {
+            let mut pictures = self.path.pictures.iter();
+            Some(pictures.find(|score| score.method == *method)?.colorfulness)
+        };
+        // Gray frames agree without merit.
+        if colorful(other).is_some_and(|strength| strength < COLORLESS) {
+            return Some(format!("{name} has no colors"));
+        }
         let views: Vec<&ConsistencyScore> = self.between.consistency.iter().collect();
         // Frames that are farthest apart come first.
         let path = self.path.consistency.iter().rev();
@@ -83,10 +94,6 @@ impl Evaluation {
         let (what, [ours, theirs]) = match both(&views) {
             Some(figures) => ("views", figures),
             None => ("frames of the path", both(&frames)?),
-        };
-        let colorful = |method: &Method| {
-            let mut pictures = self.path.pictures.iter();
-            Some(pictures.find(|score| score.method == *method)?.colorfulness)
         };
         let strength = match (colorful(&Method::Exported), colorful(other)) {
             (Some(ours), Some(theirs)) => format!("; colorfulness {ours:.1} against {theirs:.1}"),

@@ -1,6 +1,9 @@
 //! Quality against seconds as SVG, drawn into the page: nothing is fetched.
 
-use plotters::prelude::*;
+use plotters::{
+    prelude::*,
+    style::text_anchor::{HPos, Pos, VPos},
+};
 
 use super::sweep::{Measure, PointStage, SweepPoint, Tradeoff};
 
@@ -45,14 +48,15 @@ fn draw(
         .x_label_area_size(38)
         .y_label_area_size(56)
         .build_cartesian_2d(
-            (first / 1.1..last * 1.1).log_scale(),
+            (first / 1.1..last * 1.1)
+                .log_scale()
+                .with_key_points(ticks(first / 1.1, last * 1.1)),
             low - room..high + room,
         )?;
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
         .bold_line_style(BLACK.mix(0.12))
-        .x_labels(5)
         .x_label_formatter(&|seconds| format!("{seconds}"))
         .x_desc("seconds")
         .y_desc(measure.title)
@@ -65,22 +69,53 @@ fn draw(
     }
     chart.draw_series(LineSeries::new(steps, BLACK.mix(0.5)))?;
     let style = ("sans-serif", 11).into_font().color(&BLACK.mix(0.7));
+    let middle = (first * last).sqrt();
     chart.draw_series(points.iter().map(|(point, at)| {
         let (size, label) = match point.after {
             Some(_) => (3, String::new()),
             None => (5, point.label()),
         };
-        let label = Text::new(label, (6, -4), style.clone());
+        // Above the front's lines, and inside the picture.
+        let (side, anchor) = match at.0 > middle {
+            true => (-6, HPos::Right),
+            false => (6, HPos::Left),
+        };
+        let style = style.pos(Pos::new(anchor, VPos::Bottom));
+        let label = Text::new(label, (side, -3), style);
         EmptyElement::at(*at) + Circle::new((0, 0), size, BLACK.filled()) + label
     }))?;
     area.present()?;
     Ok(())
 }
 
+/// Round seconds of a logarithmic axis: fewer in a decade where there are several.
+fn ticks(from: f64, to: f64) -> Vec<f64> {
+    let digits: &[&str] = match to / from {
+        ..10.0 => &["1", "1.5", "2", "3", "4", "5", "7"],
+        ..1e3 => &["1", "2", "5"],
+        _ => &["1"],
+    };
+    let decades = from.log10().floor() as i32..=to.log10().floor() as i32;
+    // Parsed, they are as round as they are written.
+    decades
+        .flat_map(|decade| digits.iter().map(move |digit| format!("{digit}e{decade}")))
+        .filter_map(|tick| tick.parse().ok())
+        .filter(|tick| (from..=to).contains(tick))
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::fixtures::{failed, luma, sweep};
     use super::*;
+
+    #[test]
+    fn ticks_are_round_and_neither_few_nor_many() {
+        assert_eq!(ticks(3.2, 8.5), [4.0, 5.0, 7.0]);
+        assert_eq!(ticks(0.15, 0.35), [0.15, 0.2, 0.3]);
+        assert_eq!(ticks(1.6, 24.0), [2.0, 5.0, 10.0, 20.0]);
+        assert_eq!(ticks(0.5, 2e3), [1.0, 10.0, 100.0, 1000.0]);
+    }
 
     #[test]
     fn a_plot_holds_every_point_and_the_front() {

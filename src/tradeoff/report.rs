@@ -25,7 +25,7 @@ pub fn front_table(sweep: &Tradeoff, stage: PointStage) -> Option<Table> {
     Some(table)
 }
 
-/// Points in figures, a failure as its reason; gains of the measure that decides.
+/// Points in figures, reasons of failures as notes; gains of the measure that decides.
 fn table(sweep: &Tradeoff, stage: PointStage, title: &str, points: &[&SweepPoint]) -> Table {
     let measures: Vec<&Measure> = sweep.measures(stage).collect();
     let row = |point: &&SweepPoint| {
@@ -49,8 +49,7 @@ fn table(sweep: &Tradeoff, stage: PointStage, title: &str, points: &[&SweepPoint
                 }
             }
             None => {
-                let reason = point.failed.as_deref().unwrap_or_default();
-                row[0] += &format!(" failed: {reason}");
+                row.push("failed".to_owned());
                 row.resize(7 + measures.len(), String::new());
             }
         }
@@ -61,18 +60,23 @@ fn table(sweep: &Tradeoff, stage: PointStage, title: &str, points: &[&SweepPoint
         .into_iter()
         .chain(titles);
     let head = head.chain(["Gaussians", "device MiB", "host MiB"]);
+    let reason = |point: &&SweepPoint| {
+        let reason = point.failed.as_deref()?;
+        Some(format!("{} failed: {reason}", point.label()))
+    };
+    let measured = "Measured on held-out views.".to_owned();
     Table {
         title: title.to_owned(),
         head: head.map(str::to_owned).collect(),
         rows: points.iter().map(row).collect(),
-        notes: vec!["Measured on held-out views.".to_owned()],
+        notes: (std::iter::once(measured).chain(points.iter().filter_map(reason))).collect(),
     }
 }
 
 /// Style of this page, besides that of all pages.
 const STYLE: &str = "<style>
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(380px, 1fr)); gap: 1rem; }
-.plots svg { display: block; color: var(--ink); fill: var(--quiet); background: var(--card); }
+.plots svg { display: block; max-width: 100%; height: auto; color: var(--ink); fill: var(--quiet); background: var(--card); }
 pre { white-space: pre-wrap; overflow-wrap: anywhere; font-size: .78rem; }
 </style>
 ";

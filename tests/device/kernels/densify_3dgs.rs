@@ -66,9 +66,20 @@ fn published_rates_are_those_of_a_longer_run() {
 
 const EXTENT: f64 = 2.0;
 
-/// The plan for Gaussians of (standard deviation, opacity, mean signed pull), the last
-/// `held` of them held.
+/// [`capped`] where there is no lack of room.
 fn planned(
+    gaussians: &[(f32, f32, f32)],
+    held: usize,
+    removes_large: bool,
+    iteration: usize,
+) -> Vec<Descent> {
+    capped(1_000_000, gaussians, held, removes_large, iteration)
+}
+
+/// The plan for at most `max_splats` Gaussians of (standard deviation, opacity, mean signed pull),
+/// the last `held` of them held.
+fn capped(
+    max_splats: usize,
     gaussians: &[(f32, f32, f32)],
     held: usize,
     removes_large: bool,
@@ -99,7 +110,10 @@ fn planned(
         extent: EXTENT,
         removes_large,
     };
-    let settings = LumaSettings::new(15_000).by(DensifyRules::Published);
+    let settings = LumaSettings {
+        max_splats,
+        ..LumaSettings::new(15_000).by(DensifyRules::Published)
+    };
     plan(&settings, &evidence, &moment)
 }
 
@@ -148,6 +162,23 @@ fn large_ones_go_once_opacities_were_reset() {
     assert_eq!(all.len(), 2 + 4 + 1);
     let some = planned(&gaussians, 1, true, 3_100);
     assert_eq!(sources(&some), [(0, 1), (2, 0), (2, 0), (4, 1)]);
+}
+
+/// Published division comes before removal: a full set divides into the room that large ones leave.
+#[test]
+fn what_goes_makes_room() {
+    let gaussians = [
+        (0.3, 0.5, 1.0),
+        (0.33, 0.5, 0.0),
+        (0.3, 0.5, 2.0),
+        (0.1, 0.5, 3.0),
+        (9.0, 0.5, 0.0),
+    ];
+    let plan = |most| sources(&capped(most, &gaussians, 0, true, 3_100));
+    assert_eq!(plan(3), [(3, 0), (3, 0)]);
+    assert_eq!(plan(5), [(2, 0), (2, 0), (3, 0), (3, 0)]);
+    let all = [(0, 0), (0, 0), (2, 0), (2, 0), (3, 0), (3, 0)];
+    assert_eq!(plan(6), all);
 }
 
 #[test]
