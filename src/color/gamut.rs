@@ -21,28 +21,23 @@ pub fn gamut_map_lab([l, a, b]: [f64; 3]) -> [f64; 3] {
         return [f64::NAN; 3];
     }
     let l = l.clamp(0.0, 100.0);
-    let share = gamut_share([l, a, b]);
-    let linear = lab_to_linear([l, share * a, share * b]);
-    linear.map(|c| linear_to_srgb(c.clamp(0.0, 1.0)))
-}
-
-/// Share of its chroma with which a color fits in gamut at this `L*` and hue: 1 where it does.
-pub fn gamut_share([l, a, b]: [f64; 3]) -> f64 {
-    let l = l.clamp(0.0, 100.0);
-    let fits = |share: f64| in_gamut(lab_to_linear([l, share * a, share * b]));
-    if fits(1.0) || !(a.is_finite() && b.is_finite()) {
-        return 1.0;
-    }
-    let (mut inside, mut outside) = (0.0, 1.0);
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (inside + outside);
-        if fits(middle) {
-            inside = middle;
-        } else {
-            outside = middle;
+    let at = |scale: f64| lab_to_linear([l, scale * a, scale * b]);
+    let full = at(1.0);
+    let linear = if in_gamut(full) {
+        full
+    } else {
+        let (mut inside, mut outside) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (inside + outside);
+            if in_gamut(at(middle)) {
+                inside = middle;
+            } else {
+                outside = middle;
+            }
         }
-    }
-    inside
+        at(inside)
+    };
+    linear.map(|c| linear_to_srgb(c.clamp(0.0, 1.0)))
 }
 
 fn in_gamut(linear: [f64; 3]) -> bool {

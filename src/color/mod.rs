@@ -10,7 +10,7 @@ mod lab;
 mod srgb;
 
 pub use delta_e::ciede2000;
-pub use gamut::{gamut_map_lab, gamut_share};
+pub use gamut::gamut_map_lab;
 pub use gray::{GrayTable, gray_from_rgb, gray_to_lightness};
 pub use lab::{lab_to_linear, lab_to_srgb, linear_to_lab, srgb_to_lab};
 pub use srgb::{linear_to_srgb, srgb_to_linear};

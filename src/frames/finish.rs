@@ -6,17 +6,8 @@ use super::Canvas;
 use crate::{
     capture::Original,
     chroma::teacher::{AbImage, GrayImage, Upsample},
-    color::{gamut_map_lab, gamut_share, gray_to_lightness},
+    color::{gamut_map_lab, gray_to_lightness},
 };
-
-/// `L*` from which on a display shows little chroma, and the less the lighter.
-const HIGHLIGHT: f32 = 85.0;
-
-/// Reach in pixels of the lightness around a pixel, the differences in it that are grain, and by how
-/// much a pixel may be lighter without its color changing; both in `L*`.
-const REACH: usize = 3;
-const GRAIN: f32 = 8.0;
-const MARGIN: f32 = 1.5;
 
 /// A photo in color, encoded sRGB.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,9 +30,8 @@ pub struct Colored {
 ///
 /// # Panics
 /// When `ab` has not the canvas's size.
-pub fn finish(original: &Original, canvas: &Canvas, mut ab: Vec<[f32; 2]>) -> Colored {
+pub fn finish(original: &Original, canvas: &Canvas, ab: Vec<[f32; 2]>) -> Colored {
     assert_eq!(ab.len(), canvas.len(), "a color for every pixel");
-    fit_highlights(canvas, &mut ab);
     let bytes = original.bytes();
     let answer = AbImage {
         width: canvas.width,
@@ -100,35 +90,6 @@ pub fn finish(original: &Original, canvas: &Canvas, mut ab: Vec<[f32; 2]>) -> Co
         rgb: upright.turned(rgb, 1, size),
         deep: original.deep,
         exif: original.exif.clone(),
-    }
-}
-
-/// Reduces chroma near white to what a display shows at the lightness around each pixel: with the
-/// lightness of each pixel alone, grain would make color come and go from frame to frame.
-fn fit_highlights(canvas: &Canvas, ab: &mut [[f32; 2]]) {
-    let lightness: Vec<f32> = (canvas.gray.iter())
-        .map(|&gray| gray_to_lightness(f64::from(gray) / 255.0) as f32)
-        .collect();
-    let [width, height] = canvas.size();
-    for (i, ab) in ab.iter_mut().enumerate() {
-        let own = lightness[i];
-        if own < HIGHLIGHT || *ab == [0.0; 2] {
-            continue;
-        }
-        let (x, y) = (i % width, i / width);
-        let (mut sum, mut count) = (0.0, 0.0);
-        for y in y.saturating_sub(REACH)..(y + REACH + 1).min(height) {
-            for x in x.saturating_sub(REACH)..(x + REACH + 1).min(width) {
-                let other = lightness[y * width + x];
-                if (other - own).abs() < GRAIN {
-                    sum += other;
-                    count += 1.0;
-                }
-            }
-        }
-        let around = (sum / count + MARGIN).min(100.0);
-        let share = gamut_share([around, ab[0], ab[1]].map(f64::from)) as f32;
-        *ab = ab.map(|value| share * value);
     }
 }
 
