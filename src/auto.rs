@@ -51,6 +51,8 @@ pub struct AutoOptions {
     pub preset: Option<Preset>,
     /// Frames a second of the film in color; by default those of the film.
     pub frame_rate: Option<[u32; 2]>,
+    /// True if nothing is measured.
+    pub without_eval: bool,
     /// Interrupt flag of training and coloring, after which they can continue.
     pub interrupt: Arc<Interrupt>,
 }
@@ -123,8 +125,8 @@ pub struct Results {
     pub colored: PathBuf,
     /// The scene for viewers.
     pub scene: PathBuf,
-    /// Page of the evaluation, to be opened in a browser.
-    pub page: PathBuf,
+    /// Page of the evaluation, to be opened in a browser; `None` if nothing was measured.
+    pub page: Option<PathBuf>,
     /// Photos beside gray scene, teacher and colored scene.
     pub contact_sheet: PathBuf,
     /// Photos, masks and poses.
@@ -250,6 +252,8 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
                 done.carried, done.photos
             )));
         }
+        let path = results.colored.display();
+        observe(Event::Note(format!("the photos in color are there: {path}")));
         Ok(())
     })?;
 
@@ -267,6 +271,13 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         |_, observe| export(&asked, observe).map(drop),
     )?;
 
+    if options.without_eval {
+        return Ok(Results {
+            page: None,
+            ..results
+        });
+    }
+    let page = run.evaluation_page().join(files::PAGE);
     let asked = EvalOptions {
         run: Some(run.path().to_owned()),
         teacher: Some(options.teacher.clone()),
@@ -274,7 +285,7 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         frames: PATH,
         ..EvalOptions::default()
     };
-    let results_of = [&*results.page, &run.evaluation()];
+    let results_of = [&*page, &run.evaluation()];
     let stages = asked.stages();
     steps.step(Step::Eval, &from, &results_of, stages, |_, observe| {
         eval(&asked, observe).map(drop)
@@ -308,7 +319,7 @@ fn results(options: &AutoOptions, house: &Path, run: &RunFolder) -> Result<Resul
             None => PICTURES,
         }),
         scene: options.output.join(SCENE),
-        page: run.evaluation_page().join(files::PAGE),
+        page: Some(run.evaluation_page().join(files::PAGE)),
         contact_sheet: run.contact_sheet(),
         house: house.to_owned(),
         run: run.path().to_owned(),

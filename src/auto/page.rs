@@ -24,69 +24,71 @@ pub(super) fn write(reel: &Reel, spans: &[[f64; 2]], film: &Path) -> Result<(), 
         false => "The film in color is being made. ",
     });
     html.push_str(
-        "Each shot is a scene of its own, so that the same thing may differ in color between two shots. \
-         Where a cut is wrong, correct the times in <code>shots.json</code> and run the same command again.</p>\n\
-         <table>\n<thead><tr><th>Shot</th><th>In the film and in color</th><th>Time</th><th>Camera</th><th>Result</th><th>Seconds</th></tr></thead>\n<tbody>\n",
+        "Each shot is a scene of its own, so that the same thing may differ in color between two \
+         shots. Where a cut is wrong, correct the times in <code>shots.json</code> and run the same \
+         command again.</p>\n",
     );
     for (i, times) in spans.iter().enumerate() {
         let below = format!("shots/{:03}", i + 1);
-        let _ = write!(html, "<tr><td>{}</td>", i + 1);
+        let _ = writeln!(html, "<h2>Shot {}, {}</h2>", i + 1, span(*times));
         let Some(shot) = reel.shots.get(i) else {
-            let _ = writeln!(
-                html,
-                "<td></td><td>{}</td><td></td><td>to be made</td><td></td></tr>",
-                span(*times)
-            );
+            html.push_str("<p>To be made.</p>\n");
             continue;
         };
-        let picture = match folder.join(&below).join(PICTURE).is_file() {
-            true => format!(
-                "<a href=\"{below}/colored.mp4\"><img src=\"{below}/{PICTURE}\" alt=\"shot {}\" width=\"480\"></a>",
+        if folder.join(&below).join(PICTURE).is_file() {
+            let _ = writeln!(
+                html,
+                "<p><a href=\"{below}/colored.mp4\"><img src=\"{below}/{PICTURE}\" alt=\"shot {} in gray and in color\" width=\"640\"></a></p>",
                 i + 1
-            ),
-            false => String::new(),
-        };
+            );
+        }
+        let camera = shot.camera.map_or("", in_words);
         let _ = writeln!(
             html,
-            "<td>{picture}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.0}</td></tr>",
-            span(*times),
-            shot.camera.map_or("", in_words),
+            "<p>{camera}{} Made in {:.0} s.</p>",
             result(shot, &below),
             shot.seconds
         );
     }
-    html.push_str("</tbody></table>\n");
     html.push_str(html::TAIL);
     files::write(&reel.page, html.as_bytes())
 }
 
 fn in_words(camera: CameraMotion) -> &'static str {
     match camera {
-        CameraMotion::Moves => "moves",
-        CameraMotion::Turns => "turns",
-        CameraMotion::Stands => "stands",
+        CameraMotion::Moves => "The camera moves. ",
+        CameraMotion::Turns => "The camera turns. ",
+        CameraMotion::Stands => "The camera stands. ",
     }
 }
 
 /// Outcome and warnings.
 fn result(shot: &ReelShot, below: &str) -> String {
     let mut html = match &shot.outcome {
-        Outcome::Scene(_) => format!(
-            "colored; <a href=\"{below}/run/eval/{}\">measurements</a>, <a href=\"{below}/run/contact-sheet.png\">contact sheet</a>",
-            files::PAGE
-        ),
+        Outcome::Scene(results) => {
+            let measured = match results.page {
+                Some(_) => format!(
+                    "<a href=\"{below}/run/eval/{}\">measurements</a>, ",
+                    files::PAGE
+                ),
+                None => String::new(),
+            };
+            format!(
+                "Colored; {measured}<a href=\"{below}/run/contact-sheet.png\">contact sheet</a>."
+            )
+        }
         Outcome::Fallback { colors, reason } => {
             let colors = match colors {
-                Fallback::Gray => "left gray",
-                Fallback::Teacher => "colored by the teacher alone",
+                Fallback::Gray => "Left gray",
+                Fallback::Teacher => "Colored by the teacher alone",
             };
-            format!("{colors}: {}", html::escaped(reason))
+            format!("{colors}: {}.", html::escaped(reason))
         }
-        Outcome::Blank => "shows nothing".to_owned(),
+        Outcome::Blank => "Shows nothing.".to_owned(),
     };
     if let Outcome::Scene(_) = shot.outcome {
         for warning in &shot.warnings {
-            let _ = write!(html, "<br>{}", html::escaped(warning));
+            let _ = write!(html, "<br>Warning: {}.", html::escaped(warning));
         }
     }
     html
@@ -96,7 +98,7 @@ fn result(shot: &ReelShot, below: &str) -> String {
 pub(super) fn picture(shot: &ReelShot, folder: &Path) {
     let [from, to] = shot.span;
     let path = folder.join(PICTURE);
-    let both = "scale=480:-2,split[a][b];[a]format=gray,format=yuvj444p[g];[b]format=yuvj444p[c];[g][c]hstack";
+    let both = "scale=480:-2,format=yuv444p,split[a][b];[a]hue=s=0[g];[g][b]hstack";
     let ffmpeg = Program::new(FFMPEG)
         .args(["-hide_banner", "-nostats", "-loglevel", "error", "-y"])
         .option("-ss", format!("{:.3}", (to - from) / 2.0))

@@ -62,6 +62,9 @@ pub struct Auto {
     /// How much work to do [default: paper on a GPU, else draft].
     #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
+    /// Leave out the measurements and their page.
+    #[arg(long, help_heading = OUTPUT)]
+    no_eval: bool,
     /// Print the paths of all results as JSON.
     #[arg(long, help_heading = OUTPUT)]
     json: bool,
@@ -78,11 +81,18 @@ impl Auto {
             hints: self.hints,
             preset: self.preset,
             frame_rate: None,
+            without_eval: self.no_eval,
             interrupt: interrupt(),
         };
         let mut whole = Progress::default();
         let mut progress = Progress::default();
         let fallback = self.fallback;
+        let steps = Step::ALL.len() - usize::from(options.without_eval);
+        let heading = |step: Step, more: &str| {
+            let place = Step::ALL.iter().position(|&other| other == step);
+            let place = place.unwrap_or_default() + 1;
+            eprintln!("step {place} of {steps}, {}{more}", step.command());
+        };
         let mut tell = |told: AutoEvent| match told {
             AutoEvent::Shot(number, of, span) => {
                 whole.join(&mut progress);
@@ -90,12 +100,12 @@ impl Auto {
             }
             AutoEvent::Begins(step, stages) => {
                 whole.join(&mut progress);
-                eprintln!("{}", heading(step, ""));
+                heading(step, "");
                 progress = Progress::through(stages);
             }
             AutoEvent::Skips(step) => {
                 whole.join(&mut progress);
-                eprintln!("{}", heading(step, ": its result is there"));
+                heading(step, ": its result is there");
             }
             AutoEvent::Event(event) => progress.show(&event),
         };
@@ -115,15 +125,9 @@ impl Auto {
             return print(text.unwrap_or_default());
         }
         print(in_words(&results))?;
-        whole.close(&[], &next::look(&results.page))
+        let page = results.page.as_ref().unwrap_or(&results.contact_sheet);
+        whole.close(&[], &next::look(page))
     }
-}
-
-/// Heading of a step, with its number and the count of steps.
-fn heading(step: Step, more: &str) -> String {
-    let place = Step::ALL.iter().position(|&other| other == step);
-    let (place, of) = (place.unwrap_or_default() + 1, Step::ALL.len());
-    format!("step {place} of {of}, {}{more}", step.command())
 }
 
 /// Summary of a film of several shots.
@@ -142,21 +146,25 @@ fn of_reel(made: &Reel) -> String {
 
 /// Paths of the results, a line each.
 fn in_words(results: &Results) -> String {
-    let lines: [(&Path, &str); 6] = [
+    let mut lines: Vec<(&Path, &str)> = vec![
         (&results.colored, "the photos in color"),
         (&results.scene, "the scene, for viewers of splats"),
         (
             &results.contact_sheet,
             "photos, gray, teacher and scene side by side",
         ),
-        (&results.page, "what was measured"),
         (
             &results.run,
             "the run: `colorize`, `frames`, `eval` continue from it",
         ),
         (&results.house, "frames, masks and poses"),
     ];
-    let paths = lines.map(|(path, _)| path.display().to_string());
+    if let Some(page) = &results.page {
+        lines.push((page, "what was measured"));
+    }
+    let paths: Vec<String> = (lines.iter())
+        .map(|(path, _)| path.display().to_string())
+        .collect();
     let width = paths
         .iter()
         .map(|path| path.chars().count())

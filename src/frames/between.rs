@@ -1,6 +1,9 @@
 //! Colors carried from one photo to others by what moves between neighbors.
 
-use super::{Canvas, WeightedColors, window::taps};
+use super::{
+    Canvas, WeightedColors,
+    window::{self, taps},
+};
 use crate::measure::{Flow, optical_flow, visible};
 
 /// Longer side in pixels at which photos are compared: motion is smooth.
@@ -8,6 +11,9 @@ const SIDE: usize = 256;
 
 /// Difference of gray, in 8-bit levels, at which what was followed is believed by half.
 const UNLIKE: f32 = 24.0;
+
+/// Reach in pixels of the mean over which gray is compared: grain is no sign of another thing.
+const REACH: usize = 2;
 
 /// Optical flow between two neighboring photos.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,6 +79,10 @@ impl ColoredPhoto<'_> {
             size[1] as f32 / height as f32,
         ];
         let own = self.canvas.size();
+        let gray: Vec<[f32; 1]> = (self.canvas.gray.iter())
+            .map(|&gray| [f32::from(gray)])
+            .collect();
+        let mut differences = vec![[0.0; 2]; pixels];
         for i in 0..pixels {
             let (x, y) = (i % width, i / width);
             let small = [
@@ -87,13 +97,19 @@ impl ColoredPhoto<'_> {
                 (x as f32 + 0.5 + moved[0] / scale[0]) * own[0] as f32 / width as f32,
                 (y as f32 + 0.5 + moved[1] / scale[1]) * own[1] as f32 / height as f32,
             ];
-            let Some(at) = nearest(own, place) else {
+            if nearest(own, place).is_none() {
                 continue;
-            };
-            let gray = f32::from(to.gray[i]) - f32::from(self.canvas.gray[at]) - offset;
-            let likeness = 1.0 / (1.0 + (gray / UNLIKE).powi(4));
-            believed.ab[i] = self.ab[at];
-            believed.weight[i] = share * likeness;
+            }
+            let place = place.map(|at| at - 0.5);
+            let [before] = window::bilinear(&gray, own, place);
+            differences[i] = [f32::from(to.gray[i]) - before - offset, 1.0];
+            believed.ab[i] = window::bilinear(self.ab, own, place);
+            believed.weight[i] = share;
+        }
+        let around = window::sums(&differences, to.size(), REACH);
+        for (weight, [sum, count]) in believed.weight.iter_mut().zip(around) {
+            // Where nothing is known the weight is zero.
+            *weight /= 1.0 + (sum / count.max(1.0) / UNLIKE).powi(4);
         }
         believed
     }

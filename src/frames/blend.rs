@@ -223,7 +223,7 @@ fn spread(weighted: &[[f32; 3]], [width, height]: [usize; 2]) -> Vec<[f32; 2]> {
     (weighted.iter().enumerate())
         .map(|(i, &[a, b, w])| {
             let place = [i % width, i / width].map(|c| (c as f32 - 0.5) / 2.0);
-            let around = bilinear(&below, [half_width, half_height], place);
+            let around = window::bilinear(&below, [half_width, half_height], place);
             let rest = 1.0 - w.min(1.0);
             [a + rest * around[0], b + rest * around[1]]
         })
@@ -232,19 +232,6 @@ fn spread(weighted: &[[f32; 3]], [width, height]: [usize; 2]) -> Vec<[f32; 2]> {
 
 fn over(a: f32, b: f32, w: f32) -> [f32; 2] {
     if w > 0.0 { [a / w, b / w] } else { [0.0; 2] }
-}
-
-/// Bilinear value at a place in pixel indices, the border going on as it ends.
-fn bilinear(pixels: &[[f32; 2]], size: [usize; 2], place: [f32; 2]) -> [f32; 2] {
-    let [[(x0, _), (x1, s)], [(y0, _), (y1, t)]] =
-        [0, 1].map(|k: usize| window::taps(place[k], size[k]));
-    let at = |x: usize, y: usize| pixels[y * size[0] + x];
-    let row = |y: usize| mix(at(x0, y), at(x1, y), s);
-    mix(row(y0), row(y1), t)
-}
-
-fn mix(a: [f32; 2], b: [f32; 2], share: f32) -> [f32; 2] {
-    [0, 1].map(|k: usize| a[k] + share * (b[k] - a[k]))
 }
 
 fn difference(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {

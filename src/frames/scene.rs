@@ -87,13 +87,13 @@ impl<'a> SceneDrawer<'a> {
         canvas: &Canvas,
     ) -> Result<WeightedColors, GpuError> {
         let mut believed = WeightedColors::nothing(canvas.len());
-        // Drawing less photo, where the scene shows something.
-        let mut differences: Vec<Option<f32>> = vec![None; canvas.len()];
+        // Drawing and photo, where the scene shows something.
+        let mut grays: Vec<Option<[f32; 2]>> = vec![None; canvas.len()];
         for seen in views {
             let drawn = self.renderer.render(seen.camera)?;
             let places = self.places(seen, canvas);
             for (i, &place) in places.iter().enumerate() {
-                if differences[i].is_some() {
+                if grays[i].is_some() {
                     continue;
                 }
                 let at = |picture: usize| value(&drawn[picture], place);
@@ -101,12 +101,12 @@ impl<'a> SceneDrawer<'a> {
                     continue;
                 };
                 let shown = 255.0 * seen.exposure.shown(f64::from(gray[0])) as f32;
-                differences[i] = Some(shown - f32::from(canvas.gray[i]));
+                grays[i] = Some([shown, f32::from(canvas.gray[i])]);
                 believed.ab[i] = ab;
                 believed.weight[i] = step(opacity[0], OPAQUE);
             }
         }
-        let unlike = compared(&differences, canvas.size());
+        let unlike = compared(&grays, canvas.size());
         for (i, weight) in believed.weight.iter_mut().enumerate() {
             let mask = canvas
                 .mask
@@ -194,22 +194,34 @@ fn step(value: f32, [low, high]: [f32; 2]) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Difference of drawing and photo around each pixel; at 1 the scene's weight is halved.
-fn compared(differences: &[Option<f32>], size: [usize; 2]) -> Vec<f32> {
-    let sums: Vec<[f32; 2]> = (differences.iter())
-        .map(|d| d.map_or([0.0; 2], |d| [d, 1.0]))
-        .collect();
-    let means: Vec<f32> = (window::sums(&sums, size, REACH).iter())
-        .map(|&[sum, count]| {
-            if count > 0.0 {
-                (sum / count).abs()
-            } else {
-                0.0
-            }
+/// Difference of drawing and photo, in 8-bit levels, around each pixel; at 1 the scene's weight is
+/// halved.
+///
+/// It is `√(mean² + 2 (var d − cov))`, with the mean difference and, over the same pixels, the
+/// variance of the drawing d and its covariance with the photo: a drawing that is the photo, or a
+/// blur of it, covaries with it as much as it varies, whatever grain the photo has, and one of
+/// something else does not.
+fn compared(grays: &[Option<[f32; 2]>], size: [usize; 2]) -> Vec<f32> {
+    let terms: Vec<[f32; 5]> = (grays.iter())
+        .map(|gray| {
+            gray.map_or([0.0; 5], |[drawn, photo]| {
+                let [d, p] = [drawn, photo].map(|gray| gray - 128.0);
+                [d, p, d * d, d * p, 1.0]
+            })
         })
         .collect();
-    let mut known: Vec<f32> = (means.iter().zip(differences))
-        .filter_map(|(&mean, d)| d.map(|_| mean))
+    let means: Vec<f32> = (window::sums(&terms, size, REACH).iter())
+        .map(|sums| {
+            if sums[4] <= 0.0 {
+                return 0.0;
+            }
+            let [d, p, dd, dp, _] = sums.map(|sum| sum / sums[4]);
+            let not_shared = (dd - d * d) - (dp - d * p);
+            ((d - p).powi(2) + 2.0 * not_shared.max(0.0)).sqrt()
+        })
+        .collect();
+    let mut known: Vec<f32> = (means.iter().zip(grays))
+        .filter_map(|(&mean, gray)| gray.map(|_| mean))
         .collect();
     let median = match known.len() {
         0 => 0.0,
@@ -226,25 +238,43 @@ mod tests {
     #[test]
     fn what_differs_over_an_area_is_doubted_and_grain_is_not() {
         let size = [40, 30];
-        let mut differences: Vec<Option<f32>> = (0..1200)
+        let mut grays: Vec<Option<[f32; 2]>> = (0..1200)
             .map(|i| {
-                Some(if (i * 7 + i / 40) % 2 == 0 {
+                let grain = if (i * 7 + i / 40) % 2 == 0 {
                     20.0
                 } else {
                     -20.0
-                })
+                };
+                Some([100.0, 100.0 - grain])
             })
             .collect();
         for y in 10..20 {
             for x in 10..20 {
-                differences[y * 40 + x] = Some(60.0);
+                grays[y * 40 + x] = Some([100.0, 40.0]);
             }
         }
-        differences[0] = None;
-        let unlike = compared(&differences, size);
+        grays[0] = None;
+        let unlike = compared(&grays, size);
         assert!(unlike[15 * 40 + 15] > 3.0, "{}", unlike[15 * 40 + 15]);
         assert!(unlike[25 * 40 + 30] < 0.4, "{}", unlike[25 * 40 + 30]);
         assert_eq!(compared(&[None; 4], [2, 2]), [0.0; 4]);
+    }
+
+    #[test]
+    fn a_pattern_of_something_else_is_doubted_and_a_blurred_one_is_not() {
+        let size = [40, 30];
+        let pattern = |i: usize, phase: f32| 40.0 * (0.9 * (i % 40) as f32 + phase).sin();
+        let grays: Vec<Option<[f32; 2]>> = (0..1200)
+            .map(|i| {
+                let drawn = 120.0 + 0.6 * pattern(i, 0.0);
+                // As light on the whole, but another pattern on the left.
+                let phase = if i % 40 < 12 { 1.6 } else { 0.0 };
+                Some([drawn, 120.0 + pattern(i, phase)])
+            })
+            .collect();
+        let unlike = compared(&grays, size);
+        let [left, right] = [5, 30].map(|x| unlike[15 * 40 + x]);
+        assert!(left > 1.5 && right < 0.5, "{left} {right}");
     }
 
     #[test]

@@ -9,6 +9,23 @@ pub fn taps(place: f32, length: usize) -> [(usize, f32); 2] {
     [(first, 1.0 - share), ((first + 1).min(length - 1), share)]
 }
 
+/// Bilinear value at a place in pixel indices, the border going on as it ends; `[height, width]`.
+pub fn bilinear<const N: usize>(
+    pixels: &[[f32; N]],
+    [width, height]: [usize; 2],
+    [x, y]: [f32; 2],
+) -> [f32; N] {
+    let [[(x0, left), (x1, right)], rows] = [taps(x, width), taps(y, height)];
+    let mut sum = [0.0; N];
+    for (row, share) in rows {
+        let [a, b] = [x0, x1].map(|column| pixels[row * width + column]);
+        for (k, sum) in sum.iter_mut().enumerate() {
+            *sum += share * (left * a[k] + right * b[k]);
+        }
+    }
+    sum
+}
+
 /// Sums over squares of `2 reach + 1` pixels, cut off at the border; `[height, width]`.
 pub fn sums<const N: usize>(
     values: &[[f32; N]],

@@ -11,6 +11,11 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 /// found to less than a pixel, and what moves is farther off.
 const HALF_WEIGHT: f64 = 1.0;
 
+/// Displacement, in pixels of photos [`SIDE`] wide, of most matches of a pair that has moved, and the
+/// share of such pairs from which on only they count.
+const MOVED: f64 = 2.0;
+const FEW: f64 = 0.1;
+
 /// Longer side in pixels of the photos that all such distances refer to.
 pub(super) const SIDE: f64 = 640.0;
 
@@ -93,10 +98,17 @@ impl Turned {
         self.rotations[photo].transpose() * ray
     }
 
-    /// Distances of all matches of photos `side` pixels wide or high; `None` without any.
+    /// Distances of the matches of photos `side` pixels wide or high; `None` without any. Pairs that
+    /// show the same, as those of held frames, say nothing where others have moved.
     pub fn residuals(&self, seen: &[Seen], side: u32) -> Option<Residuals> {
         let scale = SIDE / f64::from(side);
+        let has_moved = |seen: &&Seen| {
+            let still = |[from, to]: &&[DVec2; 2]| scale * from.distance(*to) < MOVED;
+            2 * seen.places.iter().filter(still).count() < seen.places.len()
+        };
+        let all_count = (seen.iter().filter(has_moved).count() as f64) < FEW * seen.len() as f64;
         let mut all: Vec<f64> = (seen.iter())
+            .filter(|seen| all_count || has_moved(seen))
             .flat_map(|seen| seen.places.iter().map(|places| (seen.photos, places)))
             .map(|(photos, [from, to])| {
                 let moved = self.moved(photos, *from);

@@ -111,6 +111,41 @@ fn a_zoom_needs_focal_lengths_of_its_own() {
 }
 
 #[test]
+fn held_frames_are_no_evidence_of_a_camera_that_stands() {
+    let (_, mut seen) = shot(&[0.0, 0.0, 3.0, 3.0], &[600.0; 4], 0.03);
+    for pair in &mut seen {
+        // Photos 0 and 1, and 2 and 3, are the same.
+        if pair.photos[0] / 2 == pair.photos[1] / 2 {
+            pair.places.iter_mut().for_each(|[from, to]| *to = *from);
+        }
+    }
+    // Held frames match best.
+    let held: Vec<usize> = (0..seen.len())
+        .filter(|&k| seen[k].photos[0] / 2 == seen[k].photos[1] / 2)
+        .collect();
+    for k in held {
+        for _ in 0..6 {
+            let places = seen[k].places.clone();
+            seen[k].places.extend(places.into_iter().take(2_000));
+        }
+    }
+    let (found, residuals) = solve(&seen, 4, false);
+    assert!(residuals.median > 2.0, "{residuals:?}");
+    let all: Vec<f64> = (seen.iter().flat_map(|seen| {
+        let distance =
+            |[from, to]: &[DVec2; 2]| found.moved(seen.photos, *from).unwrap().distance(*to);
+        seen.places.iter().map(distance)
+    }))
+    .collect();
+    let small = all.iter().filter(|&&distance| distance < 1.0).count();
+    assert!(
+        2 * small > all.len(),
+        "held frames are most: {small} of {}",
+        all.len()
+    );
+}
+
+#[test]
 fn a_camera_that_moves_does_not_turn_about_one_place() {
     let (_, seen) = shot(&[0.0, 1.0, 2.0, 3.0], &[600.0; 4], 0.06);
     let (_, residuals) = solve(&seen, 4, true);

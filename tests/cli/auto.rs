@@ -76,6 +76,8 @@ fn each_step_is_done_once_and_again_when_what_it_is_made_from_changes() {
         assert_eq!(told[key], value);
     }
     assert_eq!(done(&place, &first), [""; 0]);
+    let unmeasured = place.json(&[&first[..], &["--no-eval", "--json"]].concat());
+    assert!(unmeasured["page"].is_null() && told["page"].is_string());
     std::fs::remove_file(place.path("out/scene.ply")).expect("a file");
     assert_eq!(done(&place, &first), ["export"]);
     // Another teacher leaves the gray scene; nothing that it colored is left.

@@ -75,7 +75,11 @@ fn a_film_of_several_shots_comes_back_whole() {
         Some(1)
     );
     let page = String::from_utf8(place.read("out/index.html")).expect("text");
-    for words in ["stands", "shows nothing", "left gray: no photo has a pose"] {
+    for words in [
+        "The camera stands",
+        "Shows nothing",
+        "Left gray: no photo has a pose",
+    ] {
         assert!(page.contains(words), "{words}: {page}");
     }
     // Nothing is made again, but a shot that has no scene is tried again.
