@@ -60,7 +60,7 @@ pub(super) struct Turned {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Residuals {
     pub median: f64,
-    /// 90th percentile.
+    /// 80th percentile.
     pub most: f64,
 }
 
@@ -120,7 +120,7 @@ impl Turned {
         let at = |share: f64| all.get((share * (all.len() as f64 - 1.0)).round() as usize);
         Some(Residuals {
             median: *at(0.5)?,
-            most: *at(0.9)?,
+            most: *at(0.8)?,
         })
     }
 }
