@@ -32,8 +32,8 @@ RATE = 12
 # The room: x to the right, y down, z ahead; the camera begins near its origin.
 LOW = np.array([-4.0, -2.0, -3.0])
 HIGH = np.array([4.0, 1.2, 8.0])
-# Meters of wall that a texture covers.
-TEXTURE = 3.0
+# Meters of wall that a texture covers: fewer would alias at the far end.
+TEXTURE = 7.0
 # The person: distance, half width and half height in meters, and where the feet are.
 PERSON = {"z": 5.0, "half": (0.45, 0.8), "feet": 1.2}
 GRAIN = 0.015
