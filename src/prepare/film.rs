@@ -56,7 +56,7 @@ impl FilmShots {
     /// # Errors
     /// [`PrepareError`]: FFmpeg is missing or too old, or the file is no film.
     pub fn probe(input: &Path) -> Result<Self, PrepareError> {
-        let source = probe(input)?;
+        let source = probe(input, None)?;
         Ok(Self {
             shots: Vec::new(),
             seconds: source.seconds,
@@ -73,7 +73,7 @@ pub(crate) fn film_shots(
     input: &Path,
     observe: &mut Observer<'_>,
 ) -> Result<FilmShots, PrepareError> {
-    let source = probe(input)?;
+    let source = probe(input, None)?;
     let whole = Part {
         start: 0.0,
         seconds: None,
