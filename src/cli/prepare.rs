@@ -65,7 +65,7 @@ pub struct InputArguments {
     /// Frames per second of numbered pictures, such as 16 or 24000/1001 [default: their own, or 24].
     ///
     /// With it a folder of numbered TIFF, PNG or JPEG is a film.
-    #[arg(long, help_heading = INPUT, value_name = "RATE", value_parser = rate)]
+    #[arg(long, help_heading = INPUT, value_name = "RATE", value_parser = rate, hide_short_help = true)]
     frame_rate: Option<Rate>,
     /// Frames per second that get a pose, the sharpest of their time [default: 2, 30 to 120 in all].
     #[arg(long, help_heading = INPUT, value_name = "N", value_parser = positive::<f64>)]
