@@ -239,6 +239,6 @@ mod tests {
         assert_eq!(words(Pixels::Rgb(16)), rgb[0]);
         assert_eq!(words(Pixels::Rgb(10)), [0, 512 << 6 | 512 >> 4, 65_535]);
         // 64 + 876 (0.7152 / 2 + 0.0722), and so on.
-        assert_eq!(words(Pixels::Yuv), [441, 787, 268]);
+        assert_eq!(words(Pixels::Yuv), [441, 787, 267]);
     }
 }
