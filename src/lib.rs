@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! cli → auto → tradeoff, view → run, prepare → subject → store → tell → eval, frames, viewers, blocks → report, doctor → luma, chroma → effects, measure, trajectory → raster
-//! → capture, splats → gpu, color, sections, download, npy, programs, oracle, compare → disk, hash, input
+//! → capture, splats → gpu, color, sections, download, npy, programs, archive, oracle, compare → disk, hash, input
 //! ```
 //!
 //! `doctor` compares the kernels of [`raster`], [`luma`] and [`chroma`] with the `oracle`, which
@@ -51,6 +51,8 @@
     )
 )]
 
+#[cfg(feature = "cli")]
+mod archive;
 #[cfg(feature = "cli")]
 mod auto;
 #[cfg(feature = "cli")]

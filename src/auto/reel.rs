@@ -64,7 +64,8 @@ pub fn shots_of(
     let PrepareOptions {
         input, start, shot, ..
     } = &options.prepare;
-    if input.is_dir() || start.is_some() || shot.is_some() {
+    // Numbered pictures are no file.
+    if !input.is_file() || start.is_some() || shot.is_some() {
         return Ok(None);
     }
     let path = options.output.join(SHOTS);

@@ -45,6 +45,37 @@ pub struct Film {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, schemars(skip))]
     pub times: Option<Vec<f64>>,
+    /// The pictures as the film's file has them; `None` where an earlier version prepared them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub signal: Option<Signal>,
+}
+
+/// Pictures of a film as its file has them.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Signal {
+    /// Bits of a channel, 8 to 16.
+    pub bits: u32,
+    /// FFmpeg's name of the pixel format.
+    pub pixel_format: String,
+    /// FFmpeg's name of the transfer characteristic; `None` where the file does not say.
+    pub transfer: Option<String>,
+    /// Number of the transfer characteristic in DPX files; `None` of others.
+    pub dpx_transfer: Option<u8>,
+    /// FFmpeg's name of the field order; `None` where the file does not say.
+    ///
+    /// Frames are progressive.
+    pub field_order: Option<String>,
+    /// Width over height of a pixel.
+    ///
+    /// Those of frames are square.
+    pub pixel_aspect: [u32; 2],
+    /// Time code of the first frame; `None` where the film has none.
+    pub timecode: Option<String>,
+    /// Names of numbered pictures, such as `scan_%07d.dpx`; `None` where the film is one file.
+    pub names: Option<String>,
+    /// Number of the first frame in them; 0 where the film is one file.
+    pub first: u64,
 }
 
 impl Film {
@@ -150,6 +181,7 @@ mod tests {
             size: [640, 480],
             frames: vec!["000001.png".to_owned(), "000002.png".to_owned()],
             times: None,
+            signal: None,
         }
     }
 

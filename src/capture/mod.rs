@@ -61,7 +61,7 @@ pub use dataset::{Dataset, Notice};
 pub(crate) use decode::decode_image;
 pub use error::{AmbiguousNames, CaptureError, Position};
 pub use exposure::Exposure;
-pub use film::{FRAMES, Film};
+pub use film::{FRAMES, Film, Signal};
 pub(crate) use in_order::in_order;
 pub use layers::Layers;
 pub use lens::IMPERCEPTIBLE;

@@ -10,9 +10,27 @@ use super::{
     network::NetworkArguments,
     next, print,
     progress::Progress,
-    values::{Rate, folder_or_film, rate},
+    values::{Rate, folder_or_film, one_of, rate},
 };
-use crate::run::{Frames, FramesOptions, frames};
+use crate::{
+    run::{Frames, FramesOptions, frames},
+    store::Codec,
+};
+
+const CODECS: &[(Codec, &str)] = &[
+    (Codec::H264, "8 bits, for looking at: .mp4, .mov, .mkv"),
+    (Codec::Ffv1, "Without loss, in the source's depth: .mkv"),
+    (Codec::Prores, "ProRes 422 HQ, 10 bits: .mov"),
+    (Codec::Prores4444, "ProRes 4444, 10 bits: .mov"),
+    (Codec::Dnxhr, "DNxHR HQX, 10 bits: .mxf, .mov"),
+    (Codec::Png, "A folder of PNG, 8 or 16 bits"),
+    (Codec::Tiff, "A folder of TIFF, 16 bits"),
+    (
+        Codec::Exr,
+        "A folder of OpenEXR, 16-bit floats of linear light",
+    ),
+    (Codec::Dpx, "A folder of DPX, 10 bits"),
+];
 
 /// Color the photos themselves, as pictures or as a film.
 ///
@@ -20,11 +38,12 @@ use crate::run::{Frames, FramesOptions, frames};
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma frames runs/house -o colored/
-  gs-chroma frames runs/house -o colored.mp4")]
+  gs-chroma frames runs/house -o colored.mp4
+  gs-chroma frames runs/house -o colored.mov --codec prores4444")]
 pub struct FramesCommand {
     /// Colored run folder [default: newest under runs/].
     run: Option<PathBuf>,
-    /// Folder for PNG files, or a film (.mp4, .mov, .mkv, .m4v) by FFmpeg.
+    /// Folder for pictures, or a film (.mp4, .mov, .mkv, .m4v, .mxf) by FFmpeg.
     #[arg(short, long, help_heading = OUTPUT, value_name = "DIR|FILM", value_parser = folder_or_film())]
     output: PathBuf,
     /// Teacher for what the scene does not show, such as sky [default: the run's teachers].
@@ -40,6 +59,9 @@ pub struct FramesCommand {
     /// Write the teacher's own pictures, without the scene, for comparison.
     #[arg(long, help_heading = TEACHER)]
     teacher_alone: bool,
+    /// How films or pictures are coded [default: as the source, see docs/guides/old-film.md].
+    #[arg(long, help_heading = OUTPUT, value_name = "CODEC", value_parser = one_of(CODECS))]
+    codec: Option<Codec>,
     /// Frames per second of a film, such as 24000/1001 [default: the source's, or 24].
     #[arg(long, help_heading = OUTPUT, value_name = "RATE", value_parser = rate)]
     frame_rate: Option<Rate>,
@@ -61,6 +83,7 @@ impl FramesCommand {
             output: self.output,
             hints: self.hints,
             teacher_alone: self.teacher_alone,
+            codec: self.codec,
             frame_rate: self.frame_rate.map(|Rate(rate)| rate),
         };
         let mut progress = Progress::through(options.stages());

@@ -10,7 +10,7 @@ use super::{
     next, print,
     progress::Progress,
     usage::refuse,
-    values::{folder, one_of, positive},
+    values::{Rate, folder, one_of, positive, rate},
 };
 use crate::capture::lens::MODELS;
 use crate::prepare::{CameraMotion, Cameras, Matching, PrepareOptions, Prepared, prepare};
@@ -47,7 +47,7 @@ const MATCHINGS: &[(Matching, &str)] = &[
 /// Input of `prepare` and its options.
 #[derive(Args)]
 pub struct InputArguments {
-    /// A film, or a folder of photos.
+    /// A film, numbered pictures (a folder of DPX or EXR, or scan_%06d.tif), or a folder of photos.
     #[arg(value_name = "FILM|DIR")]
     input: PathBuf,
     /// Start of the shot in the film, such as 65 or 1:05 [default: the longest shot].
@@ -62,6 +62,11 @@ pub struct InputArguments {
     /// Number of the shot, from 1, instead of --start.
     #[arg(long, help_heading = INPUT, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), conflicts_with = "start")]
     shot: Option<u16>,
+    /// Frames per second of numbered pictures, such as 16 or 24000/1001 [default: their own, or 24].
+    ///
+    /// With it a folder of numbered TIFF, PNG or JPEG is a film.
+    #[arg(long, help_heading = INPUT, value_name = "RATE", value_parser = rate, hide_short_help = true)]
+    frame_rate: Option<Rate>,
     /// Frames per second that get a pose, the sharpest of their time [default: 2, 30 to 120 in all].
     #[arg(long, help_heading = INPUT, value_name = "N", value_parser = positive::<f64>)]
     per_second: Option<f64>,
@@ -111,6 +116,7 @@ impl InputArguments {
             end: self.end.or(length.map(|(start, seconds)| start + seconds)),
             shot: self.shot.map(usize::from),
             known_shots: None,
+            frame_rate: self.frame_rate.map(|Rate(rate)| rate),
             per_second: self.per_second,
             mask: self.mask,
             masks: self.masks,
@@ -132,6 +138,7 @@ impl InputArguments {
 #[command(after_long_help = "Example:
   gs-chroma prepare photos/ -o house
   gs-chroma prepare film.mp4 -o house --start 1:05 --seconds 20
+  gs-chroma prepare scan/ -o house --frame-rate 16
   gs-chroma prepare photos/ -o house --lens OPENCV_FISHEYE --cameras one")]
 pub struct Prepare {
     #[command(flatten)]

@@ -103,7 +103,7 @@ fn way(text: &str) -> Result<PathShape, String> {
 fn film(text: &str) -> Result<PathBuf, String> {
     match is_film(Path::new(text)) {
         true => Ok(text.into()),
-        false => Err("no film: name it .mp4, .mov, .m4v or .mkv".to_owned()),
+        false => Err("no film: name it .mp4, .mov, .m4v, .mkv or .mxf".to_owned()),
     }
 }
 

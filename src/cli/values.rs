@@ -71,7 +71,7 @@ pub(super) fn folder() -> impl TypedValueParser<Value = PathBuf> {
 pub(super) fn folder_or_film() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(
         |path| match is_named_like_a_file(&path) && !is_film(&path) {
-            true => Err("no film: name it .mp4, .mov, .m4v or .mkv, or name a folder"),
+            true => Err("no film: name it .mp4, .mov, .m4v, .mkv or .mxf, or name a folder"),
             false => Ok(path),
         },
     )

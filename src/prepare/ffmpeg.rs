@@ -10,8 +10,12 @@ use super::{
     color_tags::ColorTags,
     scan::{Scan, scan},
     shots::{self, ShotDetector},
+    signal::{ratio, signal_of},
 };
-use crate::programs::{self, FFMPEG, Program, ProgramError};
+use crate::{
+    capture::Signal,
+    programs::{self, FFMPEG, Pictures, Program, ProgramError},
+};
 
 /// The oldest that knows `-fps_mode`.
 const OLDEST: [u32; 2] = [5, 1];
@@ -20,7 +24,7 @@ const OLDEST: [u32; 2] = [5, 1];
 const LOOKED_AT: f64 = 20.0;
 
 /// Containers in which seeking leads to any picture; in others it loses the first ones.
-const INDEXED: [&str; 5] = ["mov", "matroska", "avi", "mxf", "dv"];
+const INDEXED: [&str; 6] = ["mov", "matroska", "avi", "mxf", "dv", "image2"];
 
 /// The first picture of a stream is looked for in so many seconds.
 const FIRST_WITHIN: &str = "%+15";
@@ -31,8 +35,10 @@ const NAMES: &str = "%06d.png";
 /// A film's file and what it holds.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FilmSource {
-    /// The file, absolute.
+    /// The file, absolute; the pattern of numbered pictures' names.
     pub path: PathBuf,
+    /// Numbered pictures, where the film is no file.
+    pub pictures: Option<Pictures>,
     /// FFmpeg's number of the stream of pictures.
     pub(super) stream: u64,
     /// Frames a second: numerator and denominator.
@@ -51,10 +57,10 @@ pub(super) struct FilmSource {
     pub late: f64,
     /// Its colors and its projection.
     pub color_tags: ColorTags,
-    /// True if pixels are square.
-    square: bool,
-    /// True if a channel has more than 8 bits.
-    deep: bool,
+    /// Its pictures; time code and number are the first one's.
+    pub(super) signal: Signal,
+    /// True if the signal of lightness uses all values.
+    full_range: bool,
 }
 
 /// A part of a film, in seconds; open at its end where that is the film's.
@@ -95,8 +101,12 @@ impl FilmSource {
     ///
     /// # Errors
     /// [`PrepareError`].
-    pub fn probe(path: &Path) -> Result<Self, PrepareError> {
-        let said = programs::probe(path).map_err(|error| match error {
+    pub fn probe(path: &Path, pictures: Option<Pictures>) -> Result<Self, PrepareError> {
+        let said = match &pictures {
+            Some(pictures) => programs::probe_pictures(pictures),
+            None => programs::probe(path),
+        };
+        let said = said.map_err(|error| match error {
             ProgramError::Failed { said, .. } => PrepareError::at(path, match unlisted(&said) {
                 Some(format) => format!(
                     "is no film by itself, but {format}, which may lead to other files; make one file of it, such as .mp4 or .mkv"
@@ -107,6 +117,10 @@ impl FilmSource {
         })?;
         let source = Self::parse(path, &said);
         let mut source = source.map_err(|reason| PrepareError::at(path, reason))?;
+        if let Some(pictures) = pictures {
+            source.signal.know(&pictures);
+            source.pictures = Some(pictures);
+        }
         if !source.is_indexed() {
             // A recording may begin with pictures that cannot be decoded.
             let first = ["-read_intervals", FIRST_WITHIN];
@@ -130,10 +144,16 @@ impl FilmSource {
             .args(["-v", "error", "-of", "json"])
             .option("-select_streams", self.stream.to_string())
             .args(options)
-            .option("-show_entries", entries)
-            .film(&self.path)
-            .ask()?;
-        Ok(stamps(&said))
+            .option("-show_entries", entries);
+        Ok(stamps(&self.input(said).ask()?))
+    }
+
+    /// A program with the film as its input.
+    fn input(&self, program: Program) -> Program {
+        match &self.pictures {
+            Some(pictures) => program.pictures(pictures),
+            None => program.film(&self.path),
+        }
     }
 
     /// True if seeking can reach any frame.
@@ -163,10 +183,9 @@ impl FilmSource {
         let names = json["format"]["format_name"].as_str().unwrap_or_default();
         let begins = |of: &Value| stamp(&of["start_time"]);
         let begin = begins(&json["format"]).unwrap_or(0.0);
-        let format = pictures["pix_fmt"].as_str().unwrap_or_default();
-        let aspect = pictures["sample_aspect_ratio"].as_str().unwrap_or("1:1");
         Ok(Self {
             path: path.into(),
+            pictures: None,
             stream: pictures["index"].as_u64().unwrap_or(0),
             tick_rate: pictures["r_frame_rate"].as_str().and_then(ratio),
             frame_rate: frame_rate.ok_or("does not say how many frames a second it has")?,
@@ -176,8 +195,8 @@ impl FilmSource {
             zero: begin,
             late: 0.0,
             color_tags: ColorTags::of(pictures),
-            square: matches!(aspect, "1:1" | "0:1"),
-            deep: is_deep(format),
+            signal: signal_of(pictures, &json),
+            full_range: pictures["color_range"] == "pc",
         })
     }
 
@@ -208,8 +227,16 @@ impl FilmSource {
             chain.push(format!("trim=start={start}{end},setpts=PTS-{start}/TB"));
         }
         chain.extend(filters.iter().map(|&filter| filter.to_owned()));
-        let mut ffmpeg = ffmpeg
-            .film(&self.path)
+        if self
+            .path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("exr"))
+        {
+            // Of light, which is linear.
+            ffmpeg = ffmpeg.args(["-apply_trc", "iec61966_2_1"]);
+        }
+        let mut ffmpeg = self
+            .input(ffmpeg)
             .option("-map", format!("0:{}", self.stream));
         if !chain.is_empty() {
             ffmpeg = ffmpeg.option("-vf", chain.join(","));
@@ -284,16 +311,25 @@ impl FilmSource {
         written: &mut dyn FnMut(usize),
     ) -> Result<(), PrepareError> {
         let mut filters = scan.filters().to_vec();
-        if !self.square {
+        let [across, down] = self.signal.pixel_aspect;
+        if across != down {
             // The side that is too short grows, so that nothing is lost.
             filters.push(
                 "scale=w=if(gt(sar\\,1)\\,trunc(iw*sar+0.5)\\,iw):h=if(gt(sar\\,1)\\,ih\\,trunc(ih/sar+0.5)),setsar=1",
             );
         }
         filters.extend(colors);
+        let lightness = self.signal.lightness(self.full_range);
+        if colors.is_empty() {
+            filters.extend(lightness.as_deref());
+        }
         self.part(part, "error", &filters)
             .args(["-fps_mode", "passthrough", "-pix_fmt"])
-            .arg(if self.deep { "gray16be" } else { "gray" })
+            .arg(if self.signal.bits > 8 {
+                "gray16be"
+            } else {
+                "gray"
+            })
             .args(["-progress", "pipe:1", "-f", "image2"])
             // Below the folder, whose path may hold a %.
             .arg(NAMES)
@@ -346,21 +382,6 @@ fn seconds(time: f64) -> String {
     format!("{time:.6}")
 }
 
-/// A positive ratio, such as `24000/1001`.
-fn ratio(text: &str) -> Option<[u32; 2]> {
-    let (numerator, denominator) = text.split_once('/')?;
-    let ratio = [numerator.parse().ok()?, denominator.parse().ok()?];
-    (!ratio.contains(&0)).then_some(ratio)
-}
-
-/// Returns true if a pixel format has more than 8 bits a channel: these name their byte order, as
-/// do some that pack less than 8 into 16.
-fn is_deep(format: &str) -> bool {
-    let packed = ["rgb565", "bgr565", "rgb555", "bgr555", "rgb444", "bgr444"];
-    (format.ends_with("le") || format.ends_with("be"))
-        && !packed.iter().any(|packed| format.starts_with(packed))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -385,7 +406,8 @@ mod tests {
     {"index": 1, "codec_type": "video", "disposition": {"attached_pic": 1}},
     {"index": 2, "codec_type": "video", "pix_fmt": "yuv420p10le",
      "sample_aspect_ratio": "16:15", "avg_frame_rate": "0/0", "r_frame_rate": "24000/1001",
-     "disposition": {"attached_pic": 0}}
+     "field_order": "tt", "color_transfer": "unknown", "disposition": {"attached_pic": 0}},
+    {"index": 3, "codec_type": "data", "tags": {"timecode": "01:00:00:00"}}
   ],
   "format": {"duration": "12.500000", "format_name": "matroska,webm", "start_time": "-0.5"}
 }
@@ -397,6 +419,7 @@ and another"#;
         let film = FilmSource::parse(path, PROBED).unwrap();
         let expected = FilmSource {
             path: path.into(),
+            pictures: None,
             stream: 2,
             frame_rate: [24000, 1001],
             tick_rate: Some([24000, 1001]),
@@ -406,8 +429,18 @@ and another"#;
             zero: -0.5,
             late: 0.0,
             color_tags: ColorTags::of(&Value::Null),
-            square: false,
-            deep: true,
+            signal: Signal {
+                bits: 10,
+                pixel_format: "yuv420p10le".to_owned(),
+                transfer: None,
+                dpx_transfer: None,
+                field_order: Some("tt".to_owned()),
+                pixel_aspect: [16, 15],
+                timecode: Some("01:00:00:00".to_owned()),
+                names: None,
+                first: 0,
+            },
+            full_range: false,
         };
         assert_eq!(film, expected);
         for (said, word) in [
@@ -435,17 +468,5 @@ and another"#;
         let frames = r#"{"frames": [{"best_effort_timestamp_time": "1.5"}]}"#;
         assert_eq!(stamps(frames), [1.5]);
         assert!(stamps("nothing").is_empty());
-    }
-
-    #[test]
-    fn depths() {
-        for deep in ["yuv420p10le", "p010le", "gray12be", "gbrp10le", "rgb48le"] {
-            assert!(is_deep(deep), "{deep}");
-        }
-        for eight in [
-            "yuv420p", "nv12", "yuv410p", "gray", "rgb24", "rgb565le", "pal8", "",
-        ] {
-            assert!(!is_deep(eight), "{eight}");
-        }
     }
 }

@@ -15,8 +15,10 @@ use super::{
     state::{OutputState, Step, digest, of},
 };
 use crate::{
-    capture::{CaptureError, FRAMES, Film, IMAGES, in_order, photo_header},
+    archive::Timecode,
+    capture::{CaptureError, FRAMES, Film, IMAGES, Signal, in_order, photo_header},
     disk,
+    programs::Pictures,
     store::files,
     tell::{Event, Observer, Stage, count},
 };
@@ -32,9 +34,9 @@ const SHORTEST: f64 = 0.5;
 ///
 /// # Errors
 /// [`PrepareError`]: FFmpeg is missing or too old, or the file is none.
-pub(super) fn probe(input: &Path) -> Result<FilmSource, PrepareError> {
+pub(super) fn probe(input: &Path, pictures: Option<Pictures>) -> Result<FilmSource, PrepareError> {
     ffmpeg::check_version()?;
-    FilmSource::probe(input)
+    FilmSource::probe(input, pictures)
 }
 
 /// Shots of a film.
@@ -54,7 +56,7 @@ impl FilmShots {
     /// # Errors
     /// [`PrepareError`]: FFmpeg is missing or too old, or the file is no film.
     pub fn probe(input: &Path) -> Result<Self, PrepareError> {
-        let source = probe(input)?;
+        let source = probe(input, None)?;
         Ok(Self {
             shots: Vec::new(),
             seconds: source.seconds,
@@ -71,7 +73,7 @@ pub(crate) fn film_shots(
     input: &Path,
     observe: &mut Observer<'_>,
 ) -> Result<FilmShots, PrepareError> {
-    let source = probe(input)?;
+    let source = probe(input, None)?;
     let whole = Part {
         start: 0.0,
         seconds: None,
@@ -97,7 +99,19 @@ pub(super) fn frames(
     source: &FilmSource,
     observe: &mut Observer<'_>,
 ) -> Result<Vec<[f64; 2]>, PrepareError> {
-    let same_film = of(&["film", &digest(&source.path)?]);
+    let same_film = match &source.pictures {
+        None => of(&["film", &digest(&source.path)?]),
+        Some(Pictures {
+            folder,
+            names,
+            first,
+            rate: [frames, seconds],
+        }) => of(&[
+            names,
+            &format!("{first} {frames}/{seconds}"),
+            &digest(folder)?,
+        ]),
+    };
     let time = |time: Option<f64>| time.map_or(String::new(), |time| time.to_string());
     let mut parts = vec![
         "frames".to_owned(),
@@ -231,7 +245,16 @@ fn extract(
     observe: &mut Observer<'_>,
 ) -> Result<(), PrepareError> {
     let colors = source.color_tags.filters(observe)?;
-    let scan = source.scan(part)?;
+    if let Some(1 | 3) = source.signal.dpx_transfer {
+        observe(Event::Note(
+            "the pictures are logarithmic: their values stay as they are, and gray comes back with the same"
+                .to_owned(),
+        ));
+    }
+    let scan = match &source.pictures {
+        Some(_) => Scan::Progressive,
+        None => source.scan(part)?,
+    };
     match scan {
         Scan::Progressive => {}
         Scan::Interlaced => observe(Event::Note(
@@ -286,6 +309,7 @@ fn extract(
         size: header.size,
         frames: names,
         times: None,
+        signal: Some(signal_from(source, first, frame_rate)),
     };
     if let (Some(fast), Some(last)) = (varied, times.last()) {
         observe(Event::Note(format!(
@@ -301,6 +325,19 @@ fn extract(
         .map_err(files::at(&draft.path().join(FILM)))?;
     let made = [(frames, FRAMES), (draft.path().join(FILM), FILM)];
     state.place(Step::Frames, from, &made)
+}
+
+/// The signal of a shot that begins so many seconds after the film's zero, its frames at a rate.
+fn signal_from(source: &FilmSource, begin: f64, rate: [u32; 2]) -> Signal {
+    let frames = (begin * source.rate()).round().max(0.0) as u64;
+    let mut signal = source.signal.clone();
+    let begins = signal.timecode.as_deref();
+    let code = begins.and_then(|text| Timecode::parse(text, source.frame_rate));
+    signal.timecode = code.map(|code| code.after(frames).at_rate(rate).to_string());
+    if signal.names.is_some() {
+        signal.first += frames;
+    }
+    signal
 }
 
 /// When the first frame at `start` or later is shown; a rounding error is no frame.

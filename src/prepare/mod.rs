@@ -14,6 +14,7 @@ mod film;
 mod frame_times;
 mod masks;
 mod motion;
+mod numbered;
 mod options;
 mod panorama;
 mod photos;
@@ -23,6 +24,7 @@ mod rotations;
 mod scan;
 mod sharp;
 mod shots;
+mod signal;
 mod state;
 
 use std::{
@@ -42,6 +44,7 @@ pub(crate) use state::{digest, of as digest_of};
 
 use crate::{
     capture::{CaptureError, Film, IMAGES, photo_header},
+    programs::Pictures,
     store::files,
     tell::{Event, Observer, Stage, count, keeping},
 };
@@ -92,16 +95,22 @@ pub fn prepare(
 ) -> Result<Prepared, PrepareError> {
     let warnings = RefCell::default();
     let observe = &mut keeping(&warnings, observe);
-    let input = fs::canonicalize(&options.input).map_err(files::at(&options.input))?;
+    let (input, pictures) = input_of(options, observe)?;
     let output = path::absolute(&options.output).map_err(files::at(&options.output))?;
-    let is_film = check_input(&options.input, &input)?;
-    if !is_film {
+    let is_film = pictures.is_some() || check_input(&options.input, &input)?;
+    if let Some(pictures) = &pictures {
+        check_apart(options, &pictures.folder, &output)?;
+    } else if !is_film {
         check_apart(options, &input, &output)?;
         check_film_options(options)?;
+    } else if options.frame_rate.is_some() {
+        let reason =
+            "is a film with a frame rate of its own; one can be given to numbered pictures";
+        return Err(PrepareError::at(&options.input, reason));
     }
     check_masks(options)?;
     let source = match is_film {
-        true => Some(film::probe(&input)?),
+        true => Some(film::probe(&input, pictures)?),
         false => None,
     };
     let lens = match &source {
@@ -129,6 +138,19 @@ pub fn prepare(
     })
 }
 
+/// The input's path, absolute, and the numbered pictures that it names.
+fn input_of(
+    options: &PrepareOptions,
+    observe: &mut Observer<'_>,
+) -> Result<(PathBuf, Option<Pictures>), PrepareError> {
+    let pictures = numbered::find(options, observe)?;
+    let input = match &pictures {
+        Some(Pictures { folder, names, .. }) => folder.join(names),
+        None => fs::canonicalize(&options.input).map_err(files::at(&options.input))?,
+    };
+    Ok((input, pictures))
+}
+
 /// Makes only the frames of a film's shot: `frames/`, `film.json` and `images/`.
 ///
 /// # Errors
@@ -137,9 +159,9 @@ pub(crate) fn prepare_frames(
     options: &PrepareOptions,
     observe: &mut Observer<'_>,
 ) -> Result<(), PrepareError> {
-    let input = fs::canonicalize(&options.input).map_err(files::at(&options.input))?;
+    let (input, pictures) = input_of(options, observe)?;
     let output = path::absolute(&options.output).map_err(files::at(&options.output))?;
-    let source = film::probe(&input)?;
+    let source = film::probe(&input, pictures)?;
     let mut state = OutputState::open(&output, &input, options)?;
     film::frames(&mut state, options, &source, observe).map(drop)
 }
@@ -229,8 +251,9 @@ fn check_apart(options: &PrepareOptions, input: &Path, output: &Path) -> Result<
 
 /// Refuses for photos what is said about films.
 fn check_film_options(options: &PrepareOptions) -> Result<(), PrepareError> {
+    let rate = options.frame_rate.map(|[frames, _]| frames as usize);
     let of_shot = options.start.or(options.end).or(options.per_second);
-    match of_shot.is_some() || options.shot.is_some() {
+    match of_shot.is_some() || options.shot.or(rate).is_some() {
         true => Err(PrepareError::at(
             &options.input,
             "is a folder of photos; start, end, shot and frames a second are for films",

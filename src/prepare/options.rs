@@ -40,6 +40,9 @@ pub struct PrepareOptions {
     /// From when to when each shot of the film lasts, in seconds, where that is known.
     #[serde(skip)]
     pub known_shots: Option<Vec<[f64; 2]>>,
+    /// Frames a second of numbered pictures: numerator and denominator; by default their own.
+    #[serde(default)]
+    pub frame_rate: Option<[u32; 2]>,
     /// Frames a second that get a pose; 30 to 120 in all by default.
     pub per_second: Option<f64>,
     /// A mask for all photos.

@@ -4,6 +4,8 @@
 mod film;
 mod said;
 
+pub(crate) use film::Pictures;
+
 use std::{
     ffi::OsString,
     io::{self, Read, Write},
@@ -29,15 +31,18 @@ const PATIENCE: Duration = Duration::from_millis(5);
 
 /// Streams and format of a film in the words of `ffprobe`, which are JSON.
 pub(crate) fn probe(film: &Path) -> Result<String, ProgramError> {
-    let told = [
-        "-v",
-        "error",
-        "-of",
-        "json",
-        "-show_streams",
-        "-show_format",
-    ];
-    Program::new("ffprobe").args(told).film(film).ask()
+    streams().film(film).ask()
+}
+
+/// The same of numbered pictures.
+pub(crate) fn probe_pictures(pictures: &Pictures) -> Result<String, ProgramError> {
+    streams().pictures(pictures).ask()
+}
+
+fn streams() -> Program {
+    Program::new("ffprobe")
+        .args(["-v", "error", "-of", "json"])
+        .args(["-show_streams", "-show_format"])
 }
 
 /// Programs that run, so that they can be ended.

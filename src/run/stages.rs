@@ -111,7 +111,7 @@ impl EvalOptions {
 impl FramesOptions {
     /// The stages of [`frames`](super::frames).
     pub fn stages(&self) -> Vec<Stage> {
-        vec![Model, Device, Coloring]
+        vec![Model, Device, Coloring, Saving]
     }
 }
 

@@ -2,12 +2,16 @@
 
 use std::{
     fs,
-    io::{self, BufWriter, Read, Write},
+    io::{self, BufWriter, Write},
     path::{Path, PathBuf},
 };
 
-use image::{DynamicImage, ImageBuffer, ImageEncoder, RgbImage, codecs::png::PngEncoder};
+use image::RgbImage;
 
+use super::{
+    codec::Codec,
+    formats::{self, FrameFacts},
+};
 use crate::{
     disk::{self, folder_of, trust},
     frames::Colored,
@@ -50,55 +54,22 @@ pub(crate) fn write_png(path: &Path, image: &RgbImage) -> Result<(), StoreError>
     image
         .write_to(&mut bytes, image::ImageFormat::Png)
         .map_err(|error| StoreError::file(path, error.to_string()))?;
-    write(path, &marked(bytes.into_inner()))
+    write(path, &formats::marked(bytes.into_inner()))
 }
 
-/// Writes a photo in color as a PNG of its depth with the photo's EXIF, beside and renamed.
-pub(crate) fn write_colored(path: &Path, mut colored: Colored) -> Result<(), StoreError> {
-    let [width, height] = [colored.width, colored.height];
-    let failed = |reason: String| StoreError::file(path, reason);
-    let exif = colored.exif.take();
-    let image = match colored.deep {
-        true => ImageBuffer::from_raw(width, height, colored.rgb.into_flattened())
-            .map(DynamicImage::ImageRgb16),
-        false => RgbImage::from_raw(width, height, colored.bytes()).map(DynamicImage::ImageRgb8),
-    };
-    let image = image.ok_or_else(|| failed("its pixels do not fill it".to_owned()))?;
-    let mut bytes = Vec::new();
-    let mut encoder = PngEncoder::new(&mut bytes);
-    let kept = exif.map_or(Ok(()), |exif| encoder.set_exif_metadata(exif));
-    kept.map_err(|error| failed(error.to_string()))?;
-    let written = image.write_with_encoder(encoder);
-    written.map_err(|error| failed(error.to_string()))?;
-    write(path, &marked(bytes))
-}
-
-/// PNG: the signature and the header, which come before all else.
-const PNG_HEADER: usize = 8 + 25;
-
-/// PNG's keyword for the program that made a picture, and its value, as text chunks have them.
-const MADE_HERE: &[u8] = b"tEXtSoftware\0gs-chroma";
-
-/// A PNG that says which program made it.
-fn marked(mut png: Vec<u8>) -> Vec<u8> {
-    let length = (MADE_HERE.len() - 4) as u32;
-    let mut sum = flate2::Crc::new();
-    sum.update(MADE_HERE);
-    let chunk = [
-        &length.to_be_bytes()[..],
-        MADE_HERE,
-        &sum.sum().to_be_bytes(),
-    ]
-    .concat();
-    png.splice(PNG_HEADER..PNG_HEADER, chunk);
-    png
-}
-
-/// True if this program made the picture.
-fn is_ours(path: &Path) -> bool {
-    let mut begin = [0; PNG_HEADER + 4 + MADE_HERE.len()];
-    let read = input::open(path).and_then(|mut file| file.read_exact(&mut begin));
-    read.is_ok() && begin.ends_with(MADE_HERE)
+/// Writes a photo in color beside and renames: a PNG of its depth with the photo's EXIF, or what the
+/// codec has.
+pub(crate) fn write_colored(
+    path: &Path,
+    colored: Colored,
+    codec: Codec,
+    facts: FrameFacts,
+) -> Result<(), StoreError> {
+    let bytes = formats::encode(colored, codec, facts);
+    write(
+        path,
+        &bytes.map_err(|reason| StoreError::file(path, reason))?,
+    )
 }
 
 /// Files that systems put into folders by themselves.
@@ -128,7 +99,7 @@ fn other_file(folder: &Path) -> Option<PathBuf> {
                 folders.push(path);
             } else if !(OF_SYSTEMS.iter().any(|known| name == *known)
                 || disk::is_draft(&name.to_string_lossy(), None)
-                || is_ours(&path))
+                || formats::is_ours(&path))
             {
                 return Some(path);
             }

@@ -12,7 +12,10 @@ use serde_json::Value;
 use super::{RunFolder, entries::ENTRIES};
 use crate::{
     capture::{FRAMES, Film, IMAGES, MaskSource},
-    disk::trust::{FileId, Originals},
+    disk::{
+        self,
+        trust::{FileId, Originals},
+    },
     input,
     report::Report,
 };
@@ -27,8 +30,14 @@ pub(crate) struct OriginalFiles(HashMap<FileId, &'static str>);
 
 impl OriginalFiles {
     /// Adds a file, or the files below a folder, at most [`MOST`] in all. Missing paths add
-    /// nothing, nor do folders that cannot be read.
+    /// nothing, nor do folders that cannot be read. Numbered pictures are those of their folder.
     pub fn with(mut self, path: &Path, kind: &'static str) -> Self {
+        let is_pattern = path.to_string_lossy().contains('%') && !path.exists();
+        let path = if is_pattern {
+            disk::folder_of(path)
+        } else {
+            path
+        };
         let mut waiting = vec![path.to_owned()];
         let mut left = MOST;
         while let (Some(path), 1..) = (waiting.pop(), left) {

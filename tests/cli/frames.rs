@@ -51,6 +51,47 @@ fn photos_come_back_in_color_at_their_size_with_their_lightness() {
         }
     }
     assert!(colorful > 3.0, "{colorful}");
+    // Where they come from stands beside them.
+    let changes = place.read("out/frames.changes.json");
+    let changes: serde_json::Value = serde_json::from_slice(&changes).expect("JSON");
+    let (described, found) = (documented(&page(), "## Change report"), keys(&changes));
+    let below = |key: &&String| {
+        !["settings.", "scene_teachers."]
+            .iter()
+            .any(|k| key.starts_with(k))
+    };
+    assert_eq!(
+        described.iter().collect::<Vec<_>>(),
+        found.iter().filter(below).collect::<Vec<_>>()
+    );
+    assert_eq!(told["changes"], "out/frames.changes.json");
+    let teacher = &changes["teachers"][0];
+    assert_eq!(
+        teacher["sha256"].as_str().map(str::len),
+        Some(64),
+        "{teacher}"
+    );
+    for frame in changes["frames"].as_array().expect("frames") {
+        let shares = [
+            "scene",
+            "teacher",
+            "steadied",
+            "interpolated",
+            "spread",
+            "painted",
+        ];
+        let sum: f64 = shares
+            .iter()
+            .filter_map(|share| frame[share].as_f64())
+            .sum();
+        let scene = frame["scene"].as_f64().expect("a share");
+        assert!((sum - 1.0).abs() < 1e-6 && scene > 0.1, "{frame}");
+    }
+    let html = String::from_utf8(place.read("out/frames.changes.html")).expect("text");
+    assert!(
+        html.contains("01.png to left/09.png") && html.contains("ddcolor_tiny.onnx"),
+        "{html}"
+    );
     // The same once more, and the teacher's own pictures are others.
     place.succeed(&["frames", "-o", "again"]);
     place.succeed(&["frames", "-o", "alone", "--teacher-alone"]);
@@ -204,7 +245,7 @@ fn what_it_cannot_do_it_says() {
     assert_eq!(done.code, Some(1));
     assert!(done.stderr.contains("did not write"), "{}", done.stderr);
     for (output, word) in [
-        ("out.avi", ".mp4, .mov, .m4v or .mkv"),
+        ("out.avi", ".mp4, .mov, .m4v, .mkv or .mxf"),
         ("out.zip", "name a folder"),
     ] {
         let done = place.run(&["frames", "-o", output]);
@@ -293,6 +334,7 @@ esac"#;
 fn a_film_has_all_frames_the_rate_and_the_sound_of_its_source() {
     use super::program::Done;
 
+    const FILES: [&str; 3] = ["out.changes.html", "out.changes.json", "out.mp4"];
     let place = place_with_run();
     let mut frames = Vec::new();
     for index in 0..8 {
@@ -324,7 +366,7 @@ fn a_film_has_all_frames_the_rate_and_the_sound_of_its_source() {
         bytes.len(),
         9 * 3 * (scene::SIZE[0] * scene::SIZE[1]) as usize
     );
-    assert_eq!(place.files("films"), ["out.mp4"]);
+    assert_eq!(place.files("films"), FILES);
     let text = |name: &str| String::from_utf8(place.read(name)).expect("text");
     let (told, laid) = (text("told.txt"), text("laid.txt"));
     for words in ["-framerate 24000/1001", "64x48"] {
@@ -388,7 +430,7 @@ fn a_film_has_all_frames_the_rate_and_the_sound_of_its_source() {
     let done = run(&["frames", "-o", "films/out.mp4"], &path);
     assert_eq!(done.code, Some(1));
     assert!(done.stderr.contains("no such codec"), "{}", done.stderr);
-    assert_eq!(place.files("films"), ["out.mp4"]);
+    assert!(!place.files("films").contains(&"fast.mp4".to_owned()));
     assert_eq!(place.read("films/out.mp4"), bytes);
     // A frame that is not there is named.
     std::fs::remove_file(place.path("scene/frames/045.png")).expect("a frame");

@@ -1,5 +1,6 @@
 //! `frames`: the photos themselves in color.
 
+mod changes;
 mod out;
 mod painted;
 mod painter;
@@ -12,12 +13,13 @@ pub(crate) use without_scene::{PlainFramesOptions, frames_without_scene};
 
 use std::{cell::RefCell, path::PathBuf};
 
+use changes::{Changes, FrameSources};
 use out::FrameOutput;
 use painted::Painted;
 use painter::Painter;
 use range::own_range;
 use shots::{Shot, shots_of};
-use unplaced::{Bracket, Known, Steps, Unknown, carry, chain, tell, way, whole};
+use unplaced::{Bracket, Carried, Known, Steps, Unknown, carry, chain, tell, way, whole};
 
 use super::{
     RunError,
@@ -30,11 +32,7 @@ use crate::{
     frames::{Canvas, SceneDrawer, Strokes, WeightedColors, believable, blend, finish},
     gpu::Gpu,
     report::Report,
-    store::{
-        RunFolder,
-        film::{FRAME_RATE, is_film},
-        originals::OriginalFiles,
-    },
+    store::{Codec, RunFolder, film::FRAME_RATE, is_film, originals::OriginalFiles},
     subject::{
         LockMode, Run, SubjectError,
         scene::{Frame, read_scene},
@@ -50,7 +48,7 @@ const OPEN: f64 = 0.005;
 /// photos the files are read again.
 const KEPT: usize = 1 << 28;
 
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize)]
 pub struct FramesOptions {
     /// Run folder; the newest run by default.
     pub run: Option<PathBuf>,
@@ -65,6 +63,8 @@ pub struct FramesOptions {
     pub hints: Option<PathBuf>,
     /// True if the scene is left out, for comparison with the teacher's images alone.
     pub teacher_alone: bool,
+    /// Codec of the film or the pictures; by default by the output's extension and the source.
+    pub codec: Option<Codec>,
     /// Frames a second of a film; by default those of the film that the photos come from, or 24.
     pub frame_rate: Option<[u32; 2]>,
 }
@@ -75,6 +75,8 @@ pub struct FramesOptions {
 pub struct Frames {
     /// The folder or film.
     pub output: PathBuf,
+    /// Codec of the film or the pictures.
+    pub codec: Codec,
     /// Photos in color.
     pub photos: usize,
     /// Photos with a pose.
@@ -85,6 +87,8 @@ pub struct Frames {
     pub painted: usize,
     /// Share of photos with a pose that the scene covers.
     pub covered: f64,
+    /// The change report: where each frame's colors come from; `None` where it cannot be written.
+    pub changes: Option<PathBuf>,
     /// All that is doubtful, such as photos that cannot be read.
     pub warnings: Vec<String>,
     /// Wall time, in seconds.
@@ -118,7 +122,10 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         .frame_rate
         .or(film.as_ref().map(|film| film.frame_rate));
     let rate = rate.unwrap_or(FRAME_RATE);
-    let shots = shots_of(&dataset, film.as_ref(), rate)?;
+    let signal = film.as_ref().and_then(|film| film.signal.as_ref());
+    let codec = Codec::of(&options.output, options.codec, signal)?;
+    let mut shots = shots_of(&dataset, film.as_ref(), rate)?;
+    out::name(&mut shots, codec, film.as_ref());
     let in_step = |film: &Film| film.times.is_none() && is_film(&options.output);
     if film.as_ref().is_some_and(in_step) && shots.iter().any(|shot| shot.repeats != 1) {
         observe(Event::Note(
@@ -138,7 +145,8 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         range: own_range(&dataset, film.as_ref(), &shots, observe),
         side: None,
     };
-    let out = FrameOutput::open(&options.output, rate, film.as_ref(), &shots, observe)?;
+    let to = &options.output;
+    let out = FrameOutput::open(to, codec, rate, film.as_ref(), &shots, observe)?;
     let painted = find_painted(options, report, &shots, &mut painter, observe)?;
     let mut coloring = Coloring {
         painter,
@@ -149,8 +157,10 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         kept: 0,
         unplaced: Vec::new(),
         unread: Vec::new(),
+        sources: Vec::new(),
         told: Frames {
             output: options.output.clone(),
+            codec,
             ..Frames::default()
         },
     };
@@ -183,8 +193,26 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     for line in coloring.unread {
         observe(Event::Warning(format!("left out: {line}")));
     }
+    observe(Event::begins(Stage::Saving));
+    let teachers = coloring.painter.teachers.as_ref();
+    let changes = Changes {
+        options,
+        report,
+        film: film.as_ref(),
+        root: &dataset.capture.root,
+        codec,
+        rate,
+        teachers: teachers.map_or(Vec::new(), Teachers::describe),
+        shots: &shots,
+        frames: coloring.sources,
+    };
+    let changes = changes.write();
+    if let Err(error) = &changes {
+        observe(Event::Warning(format!("no change report: {error}")));
+    }
     let told = coloring.told;
     Ok(Frames {
+        changes: changes.ok(),
         covered: told.covered / told.placed.max(1) as f64,
         seconds: begun.elapsed().as_secs_f64(),
         warnings: warnings.take(),
@@ -203,9 +231,11 @@ struct Coloring<'a> {
     open: Vec<Unknown<'a>>,
     /// Their pixels that are kept.
     kept: usize,
-    /// Places of photos that were colored from others, and whether the teacher did most of it.
-    unplaced: Vec<(usize, bool)>,
+    /// Photos that were colored from others.
+    unplaced: Vec<Carried>,
     unread: Vec<String>,
+    /// Sources of each photo's colors.
+    sources: Vec<FrameSources>,
     told: Frames,
 }
 
@@ -261,6 +291,13 @@ impl<'a> Coloring<'a> {
         let views = self.painter.views(shot);
         let answer = (self.painter).answer(&shot.name, views.first(), &canvas)?;
         let ab = blend(&canvas, &seen, answer.as_deref(), before.as_ref());
+        let shares = changes::placed(&seen, before.as_ref(), answer.is_some(), strokes);
+        let (index, pose) = (shot.index, true);
+        self.sources.push(FrameSources {
+            index,
+            pose,
+            shares,
+        });
         // What comes after is colored as if nothing were painted, and painted by itself.
         let shown = strokes.map(|strokes| strokes.over(&canvas, &seen, &ab));
         let next = Known { canvas, ab, shown };
@@ -293,6 +330,8 @@ impl<'a> Coloring<'a> {
         self.told.carried += self.open.len();
         self.told.photos += self.open.len();
         let unplaced = carry(&mut self.painter, &self.open, steps, &ends, &mut self.out)?;
+        self.sources
+            .extend(unplaced.iter().map(|carried| carried.sources));
         self.unplaced.extend(unplaced);
         self.open.clear();
         Ok(())

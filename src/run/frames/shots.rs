@@ -11,6 +11,8 @@ use crate::{
 /// A photo.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Shot {
+    /// Its place among all.
+    pub index: usize,
     /// Its path below the folder of photos, or of frames.
     pub name: String,
     /// Its file.
@@ -52,8 +54,8 @@ pub(super) fn shots_of(
     let plain: Vec<&str> = names.iter().map(String::as_str).collect();
     let outputs = distinct(&plain);
     let repeats = film.map_or_else(|| vec![1; names.len()], |film| film.repeats(rate));
-    (names.iter().zip(outputs).zip(repeats))
-        .map(|((name, output), repeats)| {
+    (names.iter().zip(outputs).zip(repeats).enumerate())
+        .map(|(index, ((name, output), repeats))| {
             let range = views.get(name.as_str()).cloned().unwrap_or_default();
             // A name may be spelled otherwise on the disk.
             let path = match dataset.capture.views.get(range.start) {
@@ -68,6 +70,7 @@ pub(super) fn shots_of(
                 .into());
             }
             Ok(Shot {
+                index,
                 name: name.clone(),
                 path,
                 views: range,

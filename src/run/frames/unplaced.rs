@@ -2,7 +2,12 @@
 
 use std::{num::NonZero, thread};
 
-use super::{out::FrameOutput, painter::Painter, shots::Shot};
+use super::{
+    changes::{self, FrameSources},
+    out::FrameOutput,
+    painter::Painter,
+    shots::Shot,
+};
 use crate::{
     capture::{CaptureError, Original, in_order},
     frames::{Between, Canvas, Colored, ColoredPhoto, Strokes, WeightedColors, blend, finish},
@@ -58,6 +63,13 @@ pub(super) struct Bracket<'a> {
     pub after: Option<&'a Known>,
 }
 
+/// A photo that was colored from others.
+pub(super) struct Carried {
+    pub sources: FrameSources,
+    /// True if its colors are more the teacher's than its neighbors'.
+    pub taught: bool,
+}
+
 /// Steps from each photo to the next; `None` where their shapes differ.
 pub(super) type Steps = Vec<Option<Between>>;
 
@@ -90,16 +102,16 @@ pub(super) fn whole(steps: &[Option<Between>]) -> Option<Vec<&Between>> {
 }
 
 /// Colors photos without a pose by those before and after, and writes them. `steps` lead from
-/// the one before, if there is one, over all of them to the one after, if there is one. Of each
-/// its place is given, and whether its colors are more the teacher's than its neighbors'.
+/// the one before, if there is one, over all of them to the one after, if there is one. Gives
+/// where the colors of each come from.
 pub(super) fn carry(
     painter: &mut Painter<'_>,
     open: &[Unknown<'_>],
     steps: &Steps,
     ends: &Bracket<'_>,
     out: &mut FrameOutput,
-) -> Result<Vec<(usize, bool)>, RunError> {
-    let mut taught = Vec::with_capacity(open.len());
+) -> Result<Vec<Carried>, RunError> {
+    let mut carried = Vec::with_capacity(open.len());
     // Of several the slow part is done at once, and as many wait as there are threads.
     let threads = thread::available_parallelism().map_or(1, NonZero::get);
     for (part, some) in open.chunks(threads).enumerate() {
@@ -126,8 +138,14 @@ pub(super) fn carry(
                 true => painter.answer(&unknown.shot.name, None, canvas)?,
                 false => None,
             };
-            let little = answer.is_some() && seen.share() < LITTLE;
-            taught.push((unknown.index, little));
+            carried.push(Carried {
+                sources: FrameSources {
+                    index: unknown.index,
+                    pose: false,
+                    shares: changes::unplaced(seen.share(), answer.is_some(), unknown.strokes),
+                },
+                taught: answer.is_some() && seen.share() < LITTLE,
+            });
             known.push((unknown, seen, answer));
         }
         let (loader, range) = (painter.dataset.loader(), painter.range);
@@ -155,14 +173,14 @@ pub(super) fn carry(
             },
         )?;
     }
-    Ok(taught)
+    Ok(carried)
 }
 
 /// Tells which photos without a pose have whose colors, as [`carry`] gives them.
-pub(super) fn tell(carried: &[(usize, bool)], shots: &[Shot], observe: &mut Observer<'_>) {
+pub(super) fn tell(carried: &[Carried], shots: &[Shot], observe: &mut Observer<'_>) {
     for by_teacher in [false, true] {
-        let chosen = carried.iter().filter(|(_, taught)| *taught == by_teacher);
-        let photos: Vec<usize> = chosen.map(|(index, _)| *index).collect();
+        let chosen = carried.iter().filter(|photo| photo.taught == by_teacher);
+        let photos: Vec<usize> = chosen.map(|photo| photo.sources.index).collect();
         if photos.is_empty() {
             continue;
         }

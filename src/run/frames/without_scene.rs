@@ -11,6 +11,7 @@ use crate::{
         RunError,
         teach::{TeachOptions, Teachers},
     },
+    store::Codec,
     tell::{Event, Observer, Stage},
 };
 
@@ -43,8 +44,10 @@ pub(crate) fn frames_without_scene(
         source: std::io::ErrorKind::NotFound.into(),
     })?;
     let rate = options.frame_rate.unwrap_or(film.frame_rate);
-    let shots: Vec<Shot> = (film.frames.iter().zip(film.repeats(rate)))
-        .map(|(name, repeats)| Shot {
+    let codec = Codec::of(&options.output, None, film.signal.as_ref())?;
+    let shots: Vec<Shot> = (film.frames.iter().zip(film.repeats(rate)).enumerate())
+        .map(|(index, (name, repeats))| Shot {
+            index,
             name: name.clone(),
             path: options.capture.join(FRAMES).join(name),
             views: 0..0,
@@ -64,7 +67,8 @@ pub(crate) fn frames_without_scene(
         None => None,
     };
     let loader = Loader::new(LoadOptions::default());
-    let mut out = FrameOutput::open(&options.output, rate, Some(&film), &shots, observe)?;
+    let to = &options.output;
+    let mut out = FrameOutput::open(to, codec, rate, Some(&film), &shots, observe)?;
     let mut steadied = Steadied::default();
     for (i, shot) in shots.iter().enumerate() {
         observe(Event::progress(

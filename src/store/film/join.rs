@@ -52,7 +52,7 @@ impl FilmWriter {
             .ask();
         joined.map_err(|error| self.failed(&error))?;
         let mut tell = |line| observe(Event::Warning(line));
-        let sounding = Sound::of(film, self.container(), &mut tell).and_then(|sound| {
+        let sounding = Sound::of(film, self.container(), false, &mut tell).and_then(|sound| {
             let another = || disk::create(&self.path).map_err(|error| error.to_string());
             sound.under(draft.path(), self.container(), &another, &mut tell)
         });

@@ -59,9 +59,14 @@ struct AudioCodec {
 }
 
 impl Sound {
-    /// Sound of a film, for a container by FFmpeg's name; `None` if it has none. `tell` receives a
-    /// message about anything missing.
-    pub fn of(film: &Film, container: &str, tell: &mut dyn FnMut(String)) -> Option<Self> {
+    /// Sound of a film, for a container by FFmpeg's name; `None` if it has none. What cannot be
+    /// copied becomes AAC, or with `archival` PCM. `tell` receives a message about anything missing.
+    pub fn of(
+        film: &Film,
+        container: &str,
+        archival: bool,
+        tell: &mut dyn FnMut(String),
+    ) -> Option<Self> {
         if !film.audio {
             return None;
         }
@@ -110,7 +115,7 @@ impl Sound {
             streams.push(Stream {
                 index,
                 codec: codec.to_owned(),
-                ways: ways(codec, channels, together, container),
+                ways: ways(codec, channels, together, container, archival),
             });
         }
         (!streams.is_empty()).then(|| Self {
@@ -138,6 +143,11 @@ impl Sound {
         };
         let best = self.streams.iter().map(|stream| (stream, &stream.ways[0]));
         if let Ok(joined) = join(&best.collect::<Vec<_>>()) {
+            let changed = self
+                .streams
+                .iter()
+                .filter(|stream| !stream.ways[0].lost.is_empty());
+            changed.for_each(|stream| tell(self.line(stream, &stream.ways[0].lost)));
             return Some(joined);
         }
         // One after the other, to find out which it is.
@@ -158,10 +168,7 @@ impl Sound {
                     }
                 });
             if !lost.is_empty() {
-                let (source, Stream { index, codec, .. }) = (self.source.display(), stream);
-                tell(format!(
-                    "{source}: stream {index} of sound ({codec}) {lost}"
-                ));
+                tell(self.line(stream, &lost));
             }
             chosen.extend(found.map(|way| (stream, way)));
         }
@@ -172,6 +179,12 @@ impl Sound {
         joined
             .map_err(|reason| tell(format!("the film in color is silent: {reason}")))
             .ok()
+    }
+
+    /// A message about a stream.
+    fn line(&self, Stream { index, codec, .. }: &Stream, lost: &str) -> String {
+        let source = self.source.display();
+        format!("{source}: stream {index} of sound ({codec}) {lost}")
     }
 
     /// FFmpeg, up to its output.
@@ -222,22 +235,49 @@ impl Sound {
 
 /// Codecs for writing a stream with this many channels, the best first; `together` is true if it
 /// begins with the pictures.
-fn ways(codec: &str, channels: u64, together: bool, container: &str) -> Vec<AudioCodec> {
+fn ways(
+    codec: &str,
+    channels: u64,
+    together: bool,
+    container: &str,
+    archival: bool,
+) -> Vec<AudioCodec> {
     let way = |codec: &str, filters: &str, lost: &str| AudioCodec {
         codec: codec.to_owned(),
         filters: filters.to_owned(),
         lost: lost.to_owned(),
     };
     let among = |codecs: &str| codecs.split(' ').any(|known| known == codec);
+    let mut ways = Vec::new();
+    if container == "mxf" {
+        // Nothing else but PCM, of 48 kHz.
+        let kept = if codec == "pcm_s16le" {
+            codec
+        } else {
+            "pcm_s24le"
+        };
+        let lost = match codec == kept {
+            true => "",
+            false => "becomes PCM of 24 bits and 48 kHz",
+        };
+        ways.push(way(kept, &format!("aresample=48000,{IN_STEP}"), lost));
+        return ways;
+    }
     let taken = among(IN_MP4)
         || (container == "matroska" && among(IN_MATROSKA))
         || (container != "mp4" && codec.starts_with("pcm_"));
-    let mut ways = Vec::new();
+    if taken && together && archival {
+        ways.push(way("copy", "", ""));
+    }
     if taken && among(LOSSLESS) {
         ways.push(way(codec, IN_STEP, ""));
     }
-    if taken && together {
+    if taken && together && !archival {
         ways.push(way("copy", "", ""));
+    }
+    if archival {
+        let cut = "becomes PCM of 24 bits, cut where the pictures begin and end";
+        ways.push(way("pcm_s24le", IN_STEP, cut));
     }
     ways.push(way("aac", IN_STEP, ""));
     if channels > 2 {
@@ -256,10 +296,13 @@ fn ways(codec: &str, channels: u64, together: bool, container: &str) -> Vec<Audi
 
 /// FFmpeg with a container for its output.
 pub(super) fn in_container(mut ffmpeg: Program, container: &str) -> Program {
-    if container != "matroska" {
+    ffmpeg = match container {
+        "matroska" => ffmpeg,
+        // Any frame rate.
+        "mxf" => ffmpeg.args(["-strict", "unofficial"]),
         // A page shows it before all of it is there.
-        ffmpeg = ffmpeg.args(["-movflags", "+faststart"]);
-    }
+        _ => ffmpeg.args(["-movflags", "+faststart"]),
+    };
     ffmpeg.args(["-f", container])
 }
 
@@ -270,7 +313,7 @@ mod tests {
     #[test]
     fn sound_is_kept_as_it_is_where_the_container_has_it_and_it_begins_with_the_pictures() {
         let codecs = |codec: &str, channels, together, container: &str| {
-            let ways = ways(codec, channels, together, container);
+            let ways = ways(codec, channels, together, container, false);
             ways.into_iter().map(|way| way.codec).collect::<Vec<_>>()
         };
         assert_eq!(codecs("aac", 2, true, "mp4"), ["copy", "aac"]);
@@ -280,7 +323,13 @@ mod tests {
         assert_eq!(codecs("pcm_s24le", 2, false, "mov"), ["pcm_s24le", "aac"]);
         assert_eq!(codecs("pcm_s24le", 2, true, "mp4"), ["aac"]);
         assert_eq!(codecs("pcm_bluray", 6, false, "mov"), ["aac"; 3]);
-        let last = ways("pcm_s16le", 3, true, "mp4").pop().expect("a way");
+        let archival = |codec, container| ways(codec, 2, true, container, true).remove(0).codec;
+        assert_eq!(archival("pcm_s16le", "mov"), "copy");
+        assert_eq!(archival("opus", "mov"), "pcm_s24le");
+        assert_eq!(archival("aac", "mxf"), "pcm_s24le");
+        let last = ways("pcm_s16le", 3, true, "mp4", false)
+            .pop()
+            .expect("a way");
         assert!(
             last.filters.starts_with("pan=mono|c0<c0+c1+c2,"),
             "{}",

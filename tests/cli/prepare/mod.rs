@@ -1,5 +1,7 @@
 //! `prepare`: from photos or a film to what `fit` takes.
 
+#[cfg(unix)]
+mod archive;
 mod fakes;
 mod film;
 mod folders;

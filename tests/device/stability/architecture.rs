@@ -19,7 +19,7 @@ const FLOORS: [&[&str]; 15] = [
     &["raster"],
     &["capture", "splats"],
     &[
-        "gpu", "color", "sections", "download", "npy", "programs", "oracle", "compare",
+        "gpu", "color", "sections", "download", "npy", "programs", "archive", "oracle", "compare",
     ],
     &["disk", "hash", "input"],
 ];
