@@ -18,7 +18,7 @@ impl Timecode {
     /// second, a fraction.
     pub fn parse(text: &str, rate: [u32; 2]) -> Option<Self> {
         let fps = nominal(rate);
-        let drops = text.contains([';', '.']) && rate[1] == 1001 && fps % 30 == 0;
+        let drops = text.contains([';', '.']) && rate[1] == 1001 && fps.is_multiple_of(30);
         let dropped = if drops { fps / 15 } else { 0 };
         let parts: Vec<u64> = (text.split([':', ';', '.']).map(str::parse))
             .collect::<Result<_, _>>()

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::Program;
+use super::{Program, ProgramError};
 
 /// FFmpeg's names of what films come in. Lists of other files, such as HLS, DASH, concat and IMF,
 /// scripts, numbered pictures and devices are not among them.
@@ -25,6 +25,22 @@ pub(crate) struct Pictures {
     pub first: u64,
     /// Frames a second: numerator and denominator.
     pub rate: [u32; 2],
+}
+
+/// Streams and format of a film in the words of `ffprobe`, which are JSON.
+pub(crate) fn probe(film: &Path) -> Result<String, ProgramError> {
+    streams().film(film).ask()
+}
+
+/// The same of numbered pictures.
+pub(crate) fn probe_pictures(pictures: &Pictures) -> Result<String, ProgramError> {
+    streams().pictures(pictures).ask()
+}
+
+fn streams() -> Program {
+    Program::new("ffprobe")
+        .args(["-v", "error", "-of", "json"])
+        .args(["-show_streams", "-show_format"])
 }
 
 impl Program {

@@ -4,7 +4,7 @@
 mod film;
 mod said;
 
-pub(crate) use film::Pictures;
+pub(crate) use film::{Pictures, probe, probe_pictures};
 
 use std::{
     ffi::OsString,
@@ -28,22 +28,6 @@ pub(crate) const FFMPEG: &str = "ffmpeg";
 
 /// Interval of polling a program that has closed its output.
 const PATIENCE: Duration = Duration::from_millis(5);
-
-/// Streams and format of a film in the words of `ffprobe`, which are JSON.
-pub(crate) fn probe(film: &Path) -> Result<String, ProgramError> {
-    streams().film(film).ask()
-}
-
-/// The same of numbered pictures.
-pub(crate) fn probe_pictures(pictures: &Pictures) -> Result<String, ProgramError> {
-    streams().pictures(pictures).ask()
-}
-
-fn streams() -> Program {
-    Program::new("ffprobe")
-        .args(["-v", "error", "-of", "json"])
-        .args(["-show_streams", "-show_format"])
-}
 
 /// Programs that run, so that they can be ended.
 static RUNNING: Mutex<Vec<Arc<Mutex<Child>>>> = Mutex::new(Vec::new());

@@ -97,8 +97,10 @@ fn exr(colored: &Colored) -> Result<Vec<u8>, exr::Error> {
         let [r, g, b] = colored.rgb[place.y() * width + place.x()].map(|v| LIGHT[usize::from(v)]);
         (r, g, b)
     });
-    let mut about = exr::LayerAttributes::default();
-    about.software_name = Some(MADE_HERE.into());
+    let about = exr::LayerAttributes {
+        software_name: Some(MADE_HERE.into()),
+        ..exr::LayerAttributes::default()
+    };
     let encoding = exr::Encoding {
         compression: exr::Compression::ZIP16,
         ..exr::Encoding::UNCOMPRESSED

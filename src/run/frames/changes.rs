@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::{FramesOptions, out::timecode_of, shots::Shot};
+use super::{out::timecode_of, shots::Shot};
 use crate::{
     archive::NumberedName,
     capture::Film,
@@ -98,7 +98,11 @@ impl FrameSources {
 
 /// All that a report is made of.
 pub(super) struct Changes<'a> {
-    pub options: &'a FramesOptions,
+    pub output: &'a Path,
+    /// The folder of hints that is named.
+    pub hints: Option<&'a Path>,
+    /// What was asked for.
+    pub settings: Value,
     pub report: &'a Report,
     pub film: Option<&'a Film>,
     /// The COLMAP folder.
@@ -116,7 +120,7 @@ impl Changes<'_> {
     /// gives the path of the JSON.
     pub fn write(mut self) -> Result<PathBuf, StoreError> {
         self.frames.sort_by_key(|frame| frame.index);
-        let output = &self.options.output;
+        let output = self.output;
         // A folder may be named by dots.
         let whole = output.canonicalize().map_err(files::at(output))?;
         let place = output.file_name().map_or(&*whole, |_| output);
@@ -133,7 +137,7 @@ impl Changes<'_> {
     }
 
     fn report(&self) -> Value {
-        let (options, film) = (self.options, self.film);
+        let (output, film) = (self.output, self.film);
         let code = film.and_then(timecode_of);
         let chroma = self.report.chroma.as_ref();
         let noted = chroma.and_then(|chroma| chroma.hint_folder.as_ref());
@@ -149,7 +153,7 @@ impl Changes<'_> {
             }
             told
         });
-        let sha256 = is_film(&options.output).then(|| hash_of_file(&options.output));
+        let sha256 = is_film(output).then(|| hash_of_file(output));
         json!({
             "program": env!("CARGO_PKG_VERSION"),
             "source": {
@@ -160,7 +164,7 @@ impl Changes<'_> {
                 "signal": film.and_then(|film| film.signal.as_ref()),
             },
             "output": {
-                "path": options.output,
+                "path": output,
                 "sha256": sha256,
                 "codec": self.codec,
                 "frame_rate": self.rate,
@@ -170,8 +174,8 @@ impl Changes<'_> {
             "teachers": self.teachers,
             "scene": self.report.files,
             "scene_teachers": chroma.map(|chroma| &chroma.teachers),
-            "hints": options.hints.as_ref().map(|path| json!(path)).or(noted.map(|path| json!(path))),
-            "settings": options,
+            "hints": self.hints.map(|path| json!(path)).or(noted.map(|path| json!(path))),
+            "settings": self.settings,
             "frames": frames.collect::<Vec<_>>(),
         })
     }
@@ -181,7 +185,7 @@ impl Changes<'_> {
         let mut html = head("Changes");
         html += &format!(
             "<h1>{}</h1>\n<p class=\"note\">These colors are not in the source: gs-chroma {} kept each frame's lightness and added color from the sources below. Frames are progressive, with square pixels.</p>\n",
-            escaped(&self.options.output.to_string_lossy()),
+            escaped(&self.output.to_string_lossy()),
             env!("CARGO_PKG_VERSION"),
         );
         push_table(&mut html, &self.ranges(report));

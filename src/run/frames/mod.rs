@@ -196,7 +196,9 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     observe(Event::begins(Stage::Saving));
     let teachers = coloring.painter.teachers.as_ref();
     let changes = Changes {
-        options,
+        output: &options.output,
+        hints: options.hints.as_deref(),
+        settings: serde_json::to_value(options).unwrap_or_default(),
         report,
         film: film.as_ref(),
         root: &dataset.capture.root,
