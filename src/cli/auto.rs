@@ -57,7 +57,7 @@ pub struct Auto {
     #[arg(long, help_heading = TEACHER, value_name = "DIR")]
     hints: Option<PathBuf>,
     /// Colors of a shot whose scene cannot be found, in a film of several.
-    #[arg(long, help_heading = TEACHER, value_parser = one_of(FALLBACKS), default_value = "gray", hide_default_value = true, value_name = "HOW")]
+    #[arg(long, hide_short_help = true, help_heading = TEACHER, value_parser = one_of(FALLBACKS), default_value = "gray", hide_default_value = true, value_name = "HOW")]
     fallback: Fallback,
     /// How much work to do [default: paper on a GPU, else draft].
     #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]

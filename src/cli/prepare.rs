@@ -50,7 +50,7 @@ pub struct InputArguments {
     /// A film, numbered pictures (a folder of DPX or EXR, or scan_%06d.tif), or a folder of photos.
     #[arg(value_name = "FILM|DIR")]
     input: PathBuf,
-    /// Start of the shot in the film, such as 65 or 1:05 [default: the longest shot].
+    /// Start of the shot in the film, such as 65 or 1:05.
     #[arg(long, help_heading = INPUT, value_name = "TIME", value_parser = time)]
     start: Option<f64>,
     /// End of the shot [default: the next cut].
@@ -90,7 +90,7 @@ pub struct InputArguments {
     #[arg(long, help_heading = CAMERA, value_name = "HOW", value_parser = one_of(MOTIONS))]
     camera: Option<CameraMotion>,
     /// How photos are matched [default: sequential for films and more than 200 photos].
-    #[arg(long = "match", help_heading = CAMERA, value_name = "HOW", value_parser = one_of(MATCHINGS))]
+    #[arg(long = "match", hide_short_help = true, help_heading = CAMERA, value_name = "HOW", value_parser = one_of(MATCHINGS))]
     matching: Option<Matching>,
     /// If COLMAP is missing, install pycolmap into the cache folder.
     #[arg(long, help_heading = CAMERA)]

@@ -16,7 +16,7 @@ const OPAQUE: [f32; 2] = [0.2, 0.6];
 
 /// Difference between drawing and photo, in 8-bit levels and in medians over the photo, at which
 /// the scene is believed by half: something has moved, or was never there.
-const UNLIKE: [f32; 2] = [12.0, 4.0];
+const UNLIKE: [f32; 2] = [12.0, 2.5];
 
 /// Reach in pixels of the mean over which they are compared, for a scene is blurred.
 const REACH: usize = 3;

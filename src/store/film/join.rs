@@ -38,14 +38,15 @@ impl FilmWriter {
                 piece.seconds
             );
         }
-        let named =
-            disk::create(&self.path.with_extension("txt")).map_err(files::at(&self.path))?;
-        std::fs::write(named.path(), list).map_err(files::at(&self.path))?;
+        let folder = disk::create_folder("gs-chroma-", &std::env::temp_dir());
+        let folder = folder.map_err(files::at(&std::env::temp_dir()))?;
+        let named = folder.path().join("list.txt");
+        files::write(&named, list.as_bytes())?;
         let draft = disk::create(&self.path).map_err(files::at(&self.path))?;
         let ffmpeg = Program::new(FFMPEG)
             .args(["-hide_banner", "-nostats", "-loglevel", "error", "-y"])
             .args(["-f", "concat", "-safe", "0", "-protocol_whitelist", "file"])
-            .option("-i", named.path())
+            .option("-i", named)
             .args(["-map", "0:v:0", "-c", "copy"]);
         let joined = in_container(ffmpeg, self.container())
             .arg(draft.path())
