@@ -21,6 +21,9 @@ const UNLIKE: [f32; 2] = [12.0, 2.5];
 /// Reach in pixels of the mean over which they are compared, for a scene is blurred.
 const REACH: usize = 3;
 
+/// Reach in pixels over which places that differ are joined.
+const JOINED: usize = 4;
+
 /// Draws a colored scene as photos show it.
 pub struct SceneDrawer<'a> {
     renderer: SceneRenderer<'a>,
@@ -112,7 +115,7 @@ impl<'a> SceneDrawer<'a> {
                 .mask
                 .as_ref()
                 .map_or(1.0, |mask| f32::from(mask[i]) / 255.0);
-            *weight *= mask / (1.0 + unlike[i].powi(4));
+            *weight *= mask / (1.0 + unlike[i].powi(8));
         }
         Ok(believed)
     }
@@ -228,7 +231,10 @@ fn compared(grays: &[Option<[f32; 2]>], size: [usize; 2]) -> Vec<f32> {
         count => *known.select_nth_unstable_by(count / 2, f32::total_cmp).1,
     };
     let half = UNLIKE[0].max(UNLIKE[1] * median);
-    means.iter().map(|mean| mean / half).collect()
+    let unlike: Vec<f32> = means.iter().map(|mean| mean / half).collect();
+    // What is like the scene by chance, within something else, is of that.
+    let widened = window::extremes(&unlike, size, JOINED, f32::max);
+    window::extremes(&widened, size, JOINED, f32::min)
 }
 
 #[cfg(test)]

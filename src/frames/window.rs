@@ -49,9 +49,46 @@ pub fn sums<const N: usize>(
         .collect()
 }
 
+/// Largest or smallest value, by `most`, of squares of `2 reach + 1` pixels, cut off at the border.
+pub fn extremes(
+    values: &[f32],
+    [width, height]: [usize; 2],
+    reach: usize,
+    most: fn(f32, f32) -> f32,
+) -> Vec<f32> {
+    let range = |i: usize, length: usize| i.saturating_sub(reach)..(i + reach + 1).min(length);
+    let along = |values: &[f32],
+                 at: &dyn Fn(usize, usize) -> usize,
+                 place: usize,
+                 length: usize,
+                 i: usize| {
+        range(place, length)
+            .map(|other| values[at(i, other)])
+            .fold(values[i], most)
+    };
+    let rows: Vec<f32> = (0..values.len())
+        .map(|i| along(values, &|i, x| i / width * width + x, i % width, width, i))
+        .collect();
+    (0..values.len())
+        .map(|i| along(&rows, &|i, y| y * width + i % width, i / width, height, i))
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn holes_are_closed_and_what_is_alone_keeps_its_size() {
+        let mut values = vec![0.0; 12 * 9];
+        for at in [4 * 12 + 3, 4 * 12 + 6] {
+            values[at] = 1.0;
+        }
+        let widened = extremes(&values, [12, 9], 1, f32::max);
+        let closed = extremes(&widened, [12, 9], 1, f32::min);
+        let set: Vec<usize> = (0..closed.len()).filter(|&i| closed[i] > 0.0).collect();
+        assert_eq!(set, [51, 52, 53, 54]);
+    }
 
     #[test]
     fn squares_are_cut_off_at_the_border() {
