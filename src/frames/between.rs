@@ -83,7 +83,7 @@ impl ColoredPhoto<'_> {
             .map(|&gray| [f32::from(gray)])
             .collect();
         let mut differences = vec![[0.0; 2]; pixels];
-        for i in 0..pixels {
+        for (i, difference) in differences.iter_mut().enumerate() {
             let (x, y) = (i % width, i / width);
             let small = [
                 (x as f32 + 0.5) * scale[0] - 0.5,
@@ -102,7 +102,7 @@ impl ColoredPhoto<'_> {
             }
             let place = place.map(|at| at - 0.5);
             let [before] = window::bilinear(&gray, own, place);
-            differences[i] = [f32::from(to.gray[i]) - before - offset, 1.0];
+            *difference = [f32::from(to.gray[i]) - before - offset, 1.0];
             believed.ab[i] = window::bilinear(self.ab, own, place);
             believed.weight[i] = share;
         }

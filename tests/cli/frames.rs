@@ -89,7 +89,9 @@ fn photos_come_back_in_color_at_their_size_with_their_lightness() {
     }
     let html = String::from_utf8(place.read("out/frames.changes.html")).expect("text");
     assert!(
-        html.contains("01.png to left/09.png") && html.contains("ddcolor_tiny.onnx"),
+        html.contains("<td>00.png</td>")
+            && html.contains(" to left/09.png</td>")
+            && html.contains("ddcolor_tiny.onnx"),
         "{html}"
     );
     // The same once more, and the teacher's own pictures are others.
