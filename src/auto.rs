@@ -177,17 +177,28 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         kept: StepRecords::read(&options.output)?,
         tell,
     };
+    make_scene(options, (&house, &run), &hints, &mut steps)?;
+    make_results(options, &run, results, &mut steps)
+}
+
+/// Trains the gray scene and colors it.
+fn make_scene(
+    options: &AutoOptions,
+    (house, run): (&Path, &RunFolder),
+    hints: &str,
+    steps: &mut Steps<'_, '_>,
+) -> Result<(), AutoError> {
     let from = digest_of(&[
         &digest(&house.join("sparse"))?,
         &digest(&house.join(IMAGES))?,
-        &masks(&house)?,
+        &masks(house)?,
         &json!(options.preset).to_string(),
     ]);
     let mut asked = FitRequest {
         output: Some(run.path().to_owned()),
         preset: options.preset,
         checkpoints: checkpoints(options),
-        ..FitRequest::new(house.clone())
+        ..FitRequest::new(house.to_owned())
     };
     let results_of = [&*run.luma(), &run.report()];
     let stages = asked.stages();
@@ -201,7 +212,7 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
         &*options.teacher.to_string_lossy(),
         &teacher_digest(&options.teacher)?,
         &json!(options.teacher_settings).to_string(),
-        &hints,
+        hints,
     ]);
     let mut asked = ColorizeRequest {
         run: Some(run.path().to_owned()),
@@ -226,7 +237,16 @@ pub fn auto(options: &AutoOptions, tell: &mut Teller<'_>) -> Result<Results, Aut
             colorize(&asked, observe).map(drop)
         },
     )?;
+    Ok(())
+}
 
+/// Writes the photos in color and the file for viewers, and measures.
+fn make_results(
+    options: &AutoOptions,
+    run: &RunFolder,
+    results: Results,
+    steps: &mut Steps<'_, '_>,
+) -> Result<Results, AutoError> {
     let from = digest_of(&[
         &digest(&run.chroma())?,
         &digest(&run.color())?,

@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     capture::Film,
+    luma::LumaError,
     prepare::{
         FilmShots, PrepareError, PrepareOptions, digest, digest_of, film_shots, prepare_frames,
         span,
@@ -26,6 +27,7 @@ use crate::{
         film::{FilmWriter, Piece, Purpose},
         originals,
     },
+    subject::SubjectError,
     tell::Event,
 };
 
@@ -70,17 +72,15 @@ pub fn shots_of(
     }
     let path = options.output.join(SHOTS);
     let film = digest(input)?;
-    let mut found = match read_times(&path)? {
-        Some(times) if times.film == film => FilmShots {
+    if let Some(times) = read_times(&path)?.filter(|times| times.film == film) {
+        // Whoever joined all shots to one means that one.
+        return Ok(Some(FilmShots {
             shots: times.shots,
             ..FilmShots::probe(input)?
-        },
-        _ => {
-            tell(AutoEvent::Begins(Step::Prepare, Vec::new()));
-            film_shots(input, &mut |event| tell(AutoEvent::Event(event)))?
-        }
-    };
-    found.shots.retain(|[from, to]| from < to);
+        }));
+    }
+    tell(AutoEvent::Begins(Step::Prepare, Vec::new()));
+    let found = film_shots(input, &mut |event| tell(AutoEvent::Event(event)))?;
     if found.shots.len() < 2 {
         return Ok(None);
     }
@@ -101,14 +101,15 @@ fn read_times(path: &Path) -> Result<Option<Times>, AutoError> {
     let text = crate::input::read_to_string(path).map_err(files::at(path))?;
     let times: Times = serde_json::from_str(&text)
         .map_err(|error| StoreError::file(path, format!("{error}; correct it, or remove it")))?;
-    let in_order = times
-        .shots
-        .windows(2)
-        .all(|pair| pair[0][1] <= pair[1][0] + 1e-6);
-    match in_order {
-        true => Ok(Some(times)),
-        false => Err(StoreError::file(path, "shots overlap, or are not in order").into()),
+    let mut end = 0.0;
+    for &[from, to] in &times.shots {
+        if from + 1e-6 < end || from >= to {
+            let reason = format!("the shot from {from} to {to} ends too early, or overlaps");
+            return Err(StoreError::file(path, reason).into());
+        }
+        end = to;
     }
+    Ok(Some(times))
 }
 
 /// Goes through all shots and joins them. A shot whose scene cannot be found has the fallback.
@@ -283,14 +284,20 @@ fn one(
     Ok(shot)
 }
 
-/// Returns true if another shot may do better.
+/// Returns true if the shot has too little for a scene, or contradicts itself; a device, a teacher
+/// or a disk that fails would fail for every shot.
 fn is_of_the_shot(error: &AutoError) -> bool {
     match error {
         AutoError::Prepare(error) => matches!(
             error,
-            PrepareError::TooFew { .. } | PrepareError::NoPoses { .. } | PrepareError::Capture(_)
+            PrepareError::TooFew { .. } | PrepareError::NoPoses { .. }
         ),
-        AutoError::Run(error) => !matches!(error, RunError::Store(_) | RunError::Program(_)),
+        AutoError::Run(error) => matches!(
+            error,
+            RunError::Subject(SubjectError::Capture(_) | SubjectError::Unsound(_))
+                | RunError::Luma(LumaError::NoViews)
+                | RunError::TeacherCoversNothing { .. }
+        ),
         AutoError::Store(_) => false,
     }
 }
@@ -382,7 +389,11 @@ mod tests {
         let write = |text: &str| fs::write(&path, text).expect("writable");
         write(r#"{"film": "a", "shots": [[0, 2], [2, 3]]}"#);
         assert!(matches!(read_times(&path), Ok(Some(times)) if times.shots.len() == 2));
-        for damaged in [r#"{"film": "a", "shots": [[0, 2], [1, 3]]}"#, "{"] {
+        for damaged in [
+            r#"{"film": "a", "shots": [[0, 2], [1, 3]]}"#,
+            r#"{"film": "a", "shots": [[3, 2]]}"#,
+            "{",
+        ] {
             write(damaged);
             assert!(read_times(&path).is_err(), "{damaged}");
         }

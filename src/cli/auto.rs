@@ -35,8 +35,8 @@ const FALLBACKS: &[(Fallback, &str)] = &[
 /// Do everything: from a film or photos to a colored scene, colored photos and a page.
 ///
 /// Runs prepare, fit, colorize, frames, export and eval. Of a film with several shots each becomes
-/// a scene of its own, and all become one film; --shot or --start chooses one. Steps whose result is there are skipped,
-/// so the same command continues after an interruption.
+/// a scene of its own, and all become one film; --shot or --start chooses one. Steps whose result
+/// is there are skipped, so the same command continues after an interruption.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma teacher fetch ddcolor-tiny

@@ -27,50 +27,41 @@ pub fn bilinear<const N: usize>(
 }
 
 /// Sums over squares of `2 reach + 1` pixels, cut off at the border; `[height, width]`.
-pub fn sums<const N: usize>(
-    values: &[[f32; N]],
+pub fn sums<const N: usize>(values: &[[f32; N]], size: [usize; 2], reach: usize) -> Vec<[f32; N]> {
+    folded(values, size, reach, |sum, value| {
+        std::array::from_fn(|k| sum[k] + value[k])
+    })
+}
+
+/// Largest or smallest values, by `most`, of such squares.
+pub fn extremes(
+    values: &[f32],
+    size: [usize; 2],
+    reach: usize,
+    most: fn(f32, f32) -> f32,
+) -> Vec<f32> {
+    folded(values, size, reach, most)
+}
+
+/// Values of squares joined, along rows and then along columns.
+fn folded<T: Copy>(
+    values: &[T],
     [width, height]: [usize; 2],
     reach: usize,
-) -> Vec<[f32; N]> {
-    let add = |sum: [f32; N], value: [f32; N]| std::array::from_fn(|k| sum[k] + value[k]);
+    join: impl Fn(T, T) -> T,
+) -> Vec<T> {
     let range = |i: usize, length: usize| i.saturating_sub(reach)..(i + reach + 1).min(length);
-    let rows: Vec<[f32; N]> = (0..values.len())
+    let rows: Vec<T> = (0..values.len())
         .map(|i| {
-            let start = i / width * width;
-            let row = range(i % width, width).map(|x| values[start + x]);
-            row.fold([0.0; N], add)
+            let row = range(i % width, width).map(|x| values[i / width * width + x]);
+            row.reduce(&join).unwrap_or(values[i])
         })
         .collect();
     (0..values.len())
         .map(|i| {
             let column = range(i / width, height).map(|y| rows[y * width + i % width]);
-            column.fold([0.0; N], add)
+            column.reduce(&join).unwrap_or(rows[i])
         })
-        .collect()
-}
-
-/// Largest or smallest value, by `most`, of squares of `2 reach + 1` pixels, cut off at the border.
-pub fn extremes(
-    values: &[f32],
-    [width, height]: [usize; 2],
-    reach: usize,
-    most: fn(f32, f32) -> f32,
-) -> Vec<f32> {
-    let range = |i: usize, length: usize| i.saturating_sub(reach)..(i + reach + 1).min(length);
-    let along = |values: &[f32],
-                 at: &dyn Fn(usize, usize) -> usize,
-                 place: usize,
-                 length: usize,
-                 i: usize| {
-        range(place, length)
-            .map(|other| values[at(i, other)])
-            .fold(values[i], most)
-    };
-    let rows: Vec<f32> = (0..values.len())
-        .map(|i| along(values, &|i, x| i / width * width + x, i % width, width, i))
-        .collect();
-    (0..values.len())
-        .map(|i| along(&rows, &|i, y| y * width + i % width, i / width, height, i))
         .collect()
 }
 

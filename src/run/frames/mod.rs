@@ -164,28 +164,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
             ..Frames::default()
         },
     };
-    for (index, shot) in shots.iter().enumerate() {
-        let done = coloring.told.photos + coloring.open.len();
-        observe(Event::progress(
-            Stage::Coloring,
-            done,
-            shots.len(),
-            &*shot.name,
-        ));
-        let strokes = painted.on(index);
-        coloring.told.painted += usize::from(strokes.is_some());
-        match shot.views.is_empty() {
-            true => coloring.wait(index, shot, strokes),
-            false => coloring.color(shot, strokes)?,
-        }
-    }
-    coloring.end()?;
-    observe(Event::progress(
-        Stage::Coloring,
-        shots.len(),
-        shots.len(),
-        "",
-    ));
+    coloring.color_all(&shots, &painted, observe)?;
     coloring.out.finish(observe)?;
     if !options.teacher_alone {
         tell(&coloring.unplaced, &shots, observe);
@@ -242,6 +221,29 @@ struct Coloring<'a> {
 }
 
 impl<'a> Coloring<'a> {
+    /// Colors all photos, in order.
+    fn color_all(
+        &mut self,
+        shots: &'a [Shot],
+        painted: &'a Painted,
+        observe: &mut Observer<'_>,
+    ) -> Result<(), RunError> {
+        let count = shots.len();
+        for (index, shot) in shots.iter().enumerate() {
+            let done = self.told.photos + self.open.len();
+            observe(Event::progress(Stage::Coloring, done, count, &*shot.name));
+            let strokes = painted.on(index);
+            self.told.painted += usize::from(strokes.is_some());
+            match shot.views.is_empty() {
+                true => self.wait(index, shot, strokes),
+                false => self.color(shot, strokes)?,
+            }
+        }
+        self.end()?;
+        observe(Event::progress(Stage::Coloring, count, count, ""));
+        Ok(())
+    }
+
     /// Takes a photo without a pose.
     fn wait(&mut self, index: usize, shot: &'a Shot, strokes: Option<&'a Strokes>) {
         match self.painter.original(shot) {
