@@ -24,7 +24,8 @@ use crate::{
         TeachOptions, colorize, eval, export, fit, frames,
     },
     store::{
-        CheckpointOptions, Interrupt, RunFolder, StoreError, files, folder::OF_AUTO, originals,
+        CheckpointOptions, Codec, Interrupt, RunFolder, StoreError, files, folder::OF_AUTO,
+        originals,
     },
     tell::{Event, Observer, Stage},
 };
@@ -49,6 +50,8 @@ pub struct AutoOptions {
     pub hints: Option<PathBuf>,
     /// Length of the training; by the device by default.
     pub preset: Option<Preset>,
+    /// Codec of the film or the pictures in color.
+    pub codec: Option<Codec>,
     /// Frames a second of the film in color; by default those of the film.
     pub frame_rate: Option<[u32; 2]>,
     /// True if nothing is measured.
@@ -109,17 +112,26 @@ pub enum AutoEvent {
     Event(Event),
 }
 
-/// The film in color.
-const FILM: &str = "colored.mp4";
-
-/// The folder of photos in color.
-const PICTURES: &str = "colored";
+/// The folder of photos in color; a film has an extension besides.
+const COLORED: &str = "colored";
 
 /// The scene for viewers.
 const SCENE: &str = "scene.ply";
 
+impl AutoOptions {
+    /// Path of the film in color, or of a folder where the codec is one of pictures.
+    fn film(&self) -> PathBuf {
+        let path = self.output.join(COLORED);
+        match self.codec.unwrap_or_default().film_extension() {
+            Some(extension) => path.with_extension(extension),
+            None => path,
+        }
+    }
+}
+
 /// Paths of the results.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Results {
     /// The photos in color: a film, or a folder.
     pub colored: PathBuf,
@@ -250,15 +262,14 @@ fn make_results(
     let from = digest_of(&[
         &digest(&run.chroma())?,
         &digest(&run.color())?,
-        &*options
-            .frame_rate
-            .map_or(String::new(), |rate| format!("{rate:?}")),
+        &json!([options.frame_rate, options.codec]).to_string(),
     ]);
     let asked = FramesOptions {
         run: Some(run.path().to_owned()),
         teacher: Some(options.teacher.clone()),
         teacher_settings: options.teacher_settings.clone(),
         output: results.colored.clone(),
+        codec: options.codec,
         frame_rate: options.frame_rate,
         hints: options.hints.clone(),
         ..FramesOptions::default()
@@ -321,11 +332,12 @@ fn check(options: &AutoOptions) -> Result<(), AutoError> {
         opened.map_err(RunError::from)?;
     }
     files::make_folder(&options.output)?;
-    for result in [FILM, SCENE] {
-        files::check_no_original(&options.output.join(result))?;
+    for result in [options.film(), options.output.join(SCENE)] {
+        files::check_no_original(&result)?;
     }
-    if options.prepare.input.is_dir() && options.output.join(PICTURES).is_dir() {
-        files::make_pictures_folder(&options.output.join(PICTURES))?;
+    let pictures = options.output.join(COLORED);
+    if options.prepare.input.is_dir() && pictures.is_dir() {
+        files::make_pictures_folder(&pictures)?;
     }
     Ok(())
 }
@@ -333,11 +345,14 @@ fn check(options: &AutoOptions) -> Result<(), AutoError> {
 /// Paths of the results of photos and poses in `house`.
 fn results(options: &AutoOptions, house: &Path, run: &RunFolder) -> Result<Results, AutoError> {
     let film = Film::read(house).map_err(RunError::from)?;
+    let colored = match &film {
+        Some(_) => options.film(),
+        None => options.output.join(COLORED),
+    };
+    // A codec that photos cannot have is refused before the training.
+    Codec::of(&colored, options.codec, None)?;
     Ok(Results {
-        colored: options.output.join(match film {
-            Some(_) => FILM,
-            None => PICTURES,
-        }),
+        colored,
         scene: options.output.join(SCENE),
         page: Some(run.evaluation_page().join(files::PAGE)),
         contact_sheet: run.contact_sheet(),

@@ -2,13 +2,15 @@
 """Checks shots whose camera moves, turns or stands, with a person walking through them.
 
     python3 tools/check_shots.py [--program target/release/gs-chroma] [--work target/shots]
-        [--kinds moves turns stands] [--preset draft]
+        [--kinds moves turns stands] [--preset draft] [--sheet FILE.jpg]
 
 Renders a room (textures: the bundled photos) by ray casting, in true colors; makes a gray, grainy
 film of it and an unsteady teacher: the true colors with another cast and blotches in each frame.
 Then `prepare`, `fit`, `colorize` and `frames`, and against the truth, for the room and the person:
 the error of a and b, and its change from frame to frame (flicker), each also as a ratio to the
-teacher's own. Needs numpy, Pillow, FFmpeg and COLMAP (or its Python module).
+teacher's own, and mean ΔE00 at the true lightness. `--sheet` shows frames of the first kind: the
+film, the teacher's, the colored ones, the truth. Needs numpy, Pillow, scikit-image, FFmpeg and
+COLMAP (or its Python module).
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from skimage.color import deltaE_ciede2000
 
 ROOT = Path(__file__).parent.parent
 SIZE = (324, 216)
@@ -129,7 +132,7 @@ def save(path: Path, rgb: np.ndarray) -> None:
 
 
 def make(kind: str, work: Path) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """The film, the teacher's folder; true a and b, and masks of the person."""
+    """The film, the teacher's folder; true CIELAB, and masks of the person."""
     random = np.random.default_rng(7)
     walls = textures()
     teacher = work / "teacher"
@@ -147,7 +150,7 @@ def make(kind: str, work: Path) -> tuple[list[np.ndarray], list[np.ndarray]]:
         taught = true.copy()
         taught[..., 1:] += cast + blotch[..., None]
         save(teacher / f"{frame + 1:06}.png", shown(taught))
-        truth.append(true[..., 1:])
+        truth.append(true)
         people.append(person)
     subprocess.run(
         ["ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "gray", "-video_size", "%dx%d" % SIZE]
@@ -170,19 +173,38 @@ def colors(folder: Path) -> list[np.ndarray]:
 
 
 def measured(found: list[np.ndarray], truth: list[np.ndarray], people: list[np.ndarray]) -> dict:
-    """Root mean squares over the room and the person."""
-    wrong = [a - b for a, b in zip(found, truth, strict=True)]
+    """Root mean squares, and mean ΔE00, over the room and the person."""
+    wrong = [a - b[..., 1:] for a, b in zip(found, truth, strict=True)]
+    seen = [deltaE_ciede2000(np.dstack([b[..., 0], a]), b) for a, b in zip(found, truth)]
     result = {}
     for name, inside in (("room", False), ("person", True)):
         squares = [(w**2).sum(-1)[p == inside] for w, p in zip(wrong, people)]
+        shown = [s[p == inside] for s, p in zip(seen, people)]
         # The person is not where it was: what counts is the error that comes and goes.
         same = [(p == inside) & (q == inside) for p, q in zip(people, people[1:])]
         changes = [((w - v) ** 2).sum(-1)[s] for v, w, s in zip(wrong, wrong[1:], same)]
         result[name] = {
             "error": float(np.sqrt(np.concatenate(squares).mean())),
+            "de00": float(np.concatenate(shown).mean()),
             "flicker": float(np.sqrt(np.concatenate(changes).mean())),
         }
     return result
+
+
+def sheet(work: Path, truth: list[np.ndarray], path: Path) -> None:
+    """Frames in columns; rows: film, teacher, colored, truth."""
+    rows = []
+    for row in ("film", "teacher", "colored", "truth"):
+        frames = []
+        for frame in np.linspace(2, FRAMES - 3, 4).astype(int):
+            if row == "truth":
+                frames.append(np.round(255 * shown(truth[frame])).astype(np.uint8))
+                continue
+            folder = {"film": "house/frames"}.get(row, row)
+            picture = sorted((work / folder).glob("*.png"))[frame]
+            frames.append(np.asarray(Image.open(picture).convert("RGB")))
+        rows.append(np.hstack(frames))
+    Image.fromarray(np.vstack(rows)).save(path, quality=88)
 
 
 def check(kind: str, arguments) -> dict:
@@ -208,6 +230,8 @@ def check(kind: str, arguments) -> dict:
             sys.exit(f"{kind}: {step}: {done.stderr.strip().splitlines()[-1]}")
         if step == "prepare":
             camera = json.loads(done.stdout)["motion"]["camera"]
+    if arguments.sheet and kind == arguments.kinds[0]:
+        sheet(work, truth, arguments.sheet)
     blurred = [sum(np.roll(t, k, 0) for k in (-1, 0, 1)) / 3 for t in truth]
     blurred = [sum(np.roll(t, k, 1) for k in (-1, 0, 1)) / 3 for t in blurred]
     ours = measured(colors(work / "colored"), blurred, people)
@@ -221,15 +245,16 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=ROOT / "target/shots")
     parser.add_argument("--kinds", nargs="+", default=["moves", "turns", "stands"])
     parser.add_argument("--preset", default="draft")
+    parser.add_argument("--sheet", type=Path)
     arguments = parser.parse_args()
-    print("| shot | found | part | error | of the teacher's | flicker | of the teacher's |")
-    print("|---|---|---|--:|--:|--:|--:|")
+    print("| shot | found | part | error | of the teacher's | flicker | of the teacher's | ΔE00 |")
+    print("|---|---|---|--:|--:|--:|--:|--:|")
     for kind in arguments.kinds:
         found = check(kind, arguments)
         for part in ("room", "person"):
             ours, its = found["colored"][part], found["teacher"][part]
             cells = [f"{ours[k]:.2f} | {ours[k] / its[k]:.2f}" for k in ("error", "flicker")]
-            print(f"| {kind} | {found['camera']} | {part} | {cells[0]} | {cells[1]} |", flush=True)
+            print(f"| {kind} | {found['camera']} | {part} | {cells[0]} | {cells[1]} | {ours['de00']:.2f} |", flush=True)
         print(f"{kind}: {found['seconds']}", file=sys.stderr)
 
 

@@ -9,6 +9,7 @@ use crate::prepare::CameraMotion;
 
 /// Colors of a shot whose scene cannot be found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Fallback {
     /// Its frames stay gray.
@@ -20,7 +21,8 @@ pub enum Fallback {
 
 /// Outcome of a shot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Outcome {
     /// It has a scene.
     Scene(Box<Results>),
@@ -37,9 +39,11 @@ pub enum Outcome {
 
 /// A shot of the film, or blank frames between two.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ReelShot {
-    /// From when to when it lasts, in seconds.
+    /// Begin and end, in seconds.
     pub span: [f64; 2],
+    /// Outcome.
     pub outcome: Outcome,
     /// Motion of its camera; `None` if not known.
     pub camera: Option<CameraMotion>,
@@ -53,6 +57,7 @@ pub struct ReelShot {
 
 /// Results of a film.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Reel {
     /// The film in color, of the length of the original, with its sound.
     pub colored: PathBuf,
@@ -60,5 +65,6 @@ pub struct Reel {
     pub page: PathBuf,
     /// File of the shots' times.
     pub times: PathBuf,
+    /// Shots, and blank frames between them, in order.
     pub shots: Vec<ReelShot>,
 }

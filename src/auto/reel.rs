@@ -31,9 +31,6 @@ use crate::{
     tell::Event,
 };
 
-/// The film in color.
-const COLORED: &str = "colored.mp4";
-
 /// File of the shots' times.
 const SHOTS: &str = "shots.json";
 
@@ -125,6 +122,13 @@ pub fn reel(
     let _originals = originals::OriginalFiles::default()
         .with(&options.prepare.input, "an original")
         .keep();
+    if options
+        .codec
+        .is_some_and(|codec| codec.film_extension().is_none())
+    {
+        let reason = "several shots are joined to a film, not to pictures; choose one shot, or a codec of films";
+        return Err(StoreError::file(&options.output, reason).into());
+    }
     let parts = parts(film);
     let spans: Vec<[f64; 2]> = parts.iter().map(|part| part.span).collect();
     let each: Vec<AutoOptions> = (1..=parts.len())
@@ -162,7 +166,7 @@ pub fn reel(
         .max_by(|a, b| per_second(a).total_cmp(&per_second(b)));
     let rate = fastest.map_or(film.frame_rate, |film| film.frame_rate);
     let mut made = Reel {
-        colored: options.output.join(COLORED),
+        colored: options.film(),
         page: options.output.join("index.html"),
         times: options.output.join(SHOTS),
         shots: Vec::with_capacity(parts.len()),
@@ -241,7 +245,7 @@ fn one(
         true => None,
         false => Some(auto(options, &mut keeping)),
     };
-    let colored = options.output.join(COLORED);
+    let colored = options.film();
     let (outcome, camera) = match result {
         Some(Ok(results)) => {
             let camera = results.camera;
@@ -320,6 +324,7 @@ fn without_scene(
         &json!([
             fallback,
             options.frame_rate,
+            options.codec,
             options.teacher,
             options.teacher_settings
         ])
@@ -336,6 +341,7 @@ fn without_scene(
         capture,
         teacher,
         output: colored.to_owned(),
+        codec: options.codec,
         frame_rate: options.frame_rate,
     };
     frames_without_scene(&asked, &mut |event| tell(AutoEvent::Event(event)))?;

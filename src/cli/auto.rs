@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::{
     CliError,
+    frames::CODECS,
     headings::{BUDGET, OUTPUT, TEACHER},
     interrupt::interrupt,
     network::NetworkArguments,
@@ -22,6 +23,7 @@ use crate::{
         reel,
     },
     run::Preset,
+    store::Codec,
 };
 
 const FALLBACKS: &[(Fallback, &str)] = &[
@@ -62,6 +64,9 @@ pub struct Auto {
     /// How much work to do [default: paper on a GPU, else draft].
     #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
+    /// How the film in color is coded [default: h264].
+    #[arg(long, hide_short_help = true, help_heading = OUTPUT, value_name = "CODEC", value_parser = one_of(CODECS))]
+    codec: Option<Codec>,
     /// Leave out the measurements and their page.
     #[arg(long, help_heading = OUTPUT)]
     no_eval: bool,
@@ -80,6 +85,7 @@ impl Auto {
             teacher_settings: self.network.settings(),
             hints: self.hints,
             preset: self.preset,
+            codec: self.codec,
             frame_rate: None,
             without_eval: self.no_eval,
             interrupt: interrupt(),

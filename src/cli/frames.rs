@@ -17,7 +17,7 @@ use crate::{
     store::Codec,
 };
 
-const CODECS: &[(Codec, &str)] = &[
+pub(super) const CODECS: &[(Codec, &str)] = &[
     (Codec::H264, "8 bits, for looking at: .mp4, .mov, .mkv"),
     (Codec::Ffv1, "Without loss, in the source's depth: .mkv"),
     (Codec::Prores, "ProRes 422 HQ, 10 bits: .mov"),

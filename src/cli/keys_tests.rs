@@ -9,6 +9,7 @@ use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Map, Value};
 
 use crate::{
+    auto::outcome::Reel,
     prepare::Prepared,
     report::{Evaluation, KernelReport, Report},
     run::Frames,
@@ -30,6 +31,7 @@ fn tables_are_those_of_the_types() {
         ("eval", Rows::of::<Evaluation>().table(|_| true)),
         ("frames", Rows::of::<Frames>().table(|_| true)),
         ("prepare", Rows::of::<Prepared>().table(|_| true)),
+        ("reel", Rows::of::<Reel>().table(|_| true)),
     ];
     let page = fs::read_to_string(PAGE).expect("the page");
     let wanted = tables.iter().fold(page.clone(), |page, (name, table)| {

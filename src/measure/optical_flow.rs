@@ -6,6 +6,10 @@
 //! principles*, CVPR 2010). Pictures are compared with their local mean and contrast taken out, so
 //! that flicker and fading move nothing.
 
+mod relax;
+
+use relax::{Data, Equations};
+
 use super::Flow;
 
 /// Reach in pixels of the local mean and contrast.
@@ -17,20 +21,22 @@ const EVEN: f32 = 4.0;
 /// Levels end where a side would be shorter than this.
 const SHORTEST: usize = 12;
 
-/// Warps on each level.
+/// Warps on each level at most, and by how many pixels one moves the flow, root mean square, that
+/// is the last.
 const WARPS: usize = 4;
+const STAYS: f32 = 0.02;
 
-/// Sweeps over all pixels for each warp.
+/// Sweeps over all pixels for each warp at most, in how many the penalties' weights are held, and
+/// the change in pixels, root mean square, from which on they are taken anew at once.
 const SWEEPS: usize = 24;
+const HELD: usize = 8;
+const SETTLED: f32 = 1e-3;
 
 /// Weight of smoothness relative to data, both in units of local contrast.
 const SMOOTHNESS: f32 = 0.12;
 
 /// Below this, penalties are quadratic: of data, in local contrasts, and of slopes, in pixels.
 const ROUNDED: [f32; 2] = [0.05, 0.05];
-
-/// Successive over-relaxation.
-const OVER: f32 = 1.7;
 
 /// The flow from one picture to another of the same size, known everywhere. Gray is in 8-bit
 /// levels, `[height, width]`.
@@ -64,8 +70,11 @@ pub fn optical_flow(from: &[f32], to: &[f32], [width, height]: [usize; 2]) -> Fl
             false => enlarged(&vectors, coarser, from.size),
         };
         for _ in 0..WARPS {
-            refine(&from, &to, &mut vectors);
+            let moved = refine(&from, &to, &mut vectors);
             vectors = median(&vectors, from.size);
+            if moved < STAYS {
+                break;
+            }
         }
         coarser = from.size;
     }
@@ -184,113 +193,53 @@ fn enlarged(vectors: &[[f32; 2]], from: [usize; 2], to: [usize; 2]) -> Vec<[f32;
     large
 }
 
-/// One pixel's part of the data term: its gradient, and the difference where the flow is now.
-#[derive(Clone, Copy, Default)]
-struct Data {
-    x: f32,
-    y: f32,
-    difference: f32,
-    weight: f32,
+/// Moves the flow to where the pictures, linearized about it, agree best. Gives the root mean
+/// square in pixels of what it moved by.
+fn refine(from: &Gray, to: &Gray, vectors: &mut [[f32; 2]]) -> f32 {
+    let start = vectors.to_vec();
+    let data = linearized(from, to, &start);
+    let mut equations = Equations::new(from.size);
+    for _ in 0..SWEEPS / HELD {
+        equations.hold(&data, vectors);
+        let changes = (0..HELD).map(|_| equations.sweep());
+        let settled = changes.take_while(|&change| change > SETTLED).count();
+        equations.read(vectors);
+        if settled == 0 {
+            break;
+        }
+    }
+    let moved = vectors.iter().zip(&start);
+    let moved = moved.map(|(new, old)| (new[0] - old[0]).powi(2) + (new[1] - old[1]).powi(2));
+    (moved.sum::<f32>() / start.len() as f32).sqrt()
 }
 
-/// Moves the flow to where the pictures, linearized about it, agree best.
-fn refine(from: &Gray, to: &Gray, vectors: &mut [[f32; 2]]) {
-    let [width, height] = from.size;
-    let start = vectors.to_vec();
-    let mut data = vec![Data::default(); start.len()];
-    for (i, data) in data.iter_mut().enumerate() {
-        let (x, y) = (i % width, i / width);
-        let [u, v] = start[i];
-        let (px, py) = (x as f32 + u, y as f32 + v);
-        let Some(there) = to.at(px, py) else { continue };
-        let slope = |a: Option<f32>, b: Option<f32>| match (a, b) {
-            (Some(a), Some(b)) => 0.5 * (b - a),
-            _ => 0.0,
+/// The pictures linearized about the flow `start`, at every pixel.
+fn linearized(from: &Gray, to: &Gray, start: &[[f32; 2]]) -> Vec<Data> {
+    let width = from.size[0];
+    let slope = |a: Option<f32>, b: Option<f32>| match (a, b) {
+        (Some(a), Some(b)) => 0.5 * (b - a),
+        _ => 0.0,
+    };
+    let of = |(i, &[u, v]): (usize, &[f32; 2])| {
+        let (x, y) = ((i % width) as f32, (i / width) as f32);
+        let (px, py) = (x + u, y + v);
+        let Some(there) = to.at(px, py) else {
+            return Data::default();
         };
         // Of both pictures, the mean.
-        let here = |x: f32, y: f32| from.at(x, y);
-        let (fx, fy) = (x as f32, y as f32);
-        *data = Data {
-            x: 0.5
-                * (slope(to.at(px - 1.0, py), to.at(px + 1.0, py))
-                    + slope(here(fx - 1.0, fy), here(fx + 1.0, fy))),
-            y: 0.5
-                * (slope(to.at(px, py - 1.0), to.at(px, py + 1.0))
-                    + slope(here(fx, fy - 1.0), here(fx, fy + 1.0))),
-            difference: there - from.pixels[i],
-            weight: 0.0,
-        };
-    }
-    let mut smooth = vec![[0.0_f32; 2]; start.len()];
-    for sweep in 0..SWEEPS {
-        if sweep % 8 == 0 {
-            for (i, data) in data.iter_mut().enumerate() {
-                let rest = data.difference
-                    + data.x * (vectors[i][0] - start[i][0])
-                    + data.y * (vectors[i][1] - start[i][1]);
-                data.weight = 1.0 / (rest * rest + ROUNDED[0] * ROUNDED[0]).sqrt();
-            }
-            for (i, smooth) in smooth.iter_mut().enumerate() {
-                let edge = |there: bool, j: usize| {
-                    if !there {
-                        return 0.0;
-                    }
-                    let [du, dv] = [0, 1].map(|k: usize| vectors[j][k] - vectors[i][k]);
-                    SMOOTHNESS / (du * du + dv * dv + ROUNDED[1] * ROUNDED[1]).sqrt()
-                };
-                *smooth = [
-                    edge(i % width + 1 < width, i + 1),
-                    edge(i / width + 1 < height, i + width),
-                ];
-            }
+        let dx = 0.5
+            * (slope(to.at(px - 1.0, py), to.at(px + 1.0, py))
+                + slope(from.at(x - 1.0, y), from.at(x + 1.0, y)));
+        let dy = 0.5
+            * (slope(to.at(px, py - 1.0), to.at(px, py + 1.0))
+                + slope(from.at(x, y - 1.0), from.at(x, y + 1.0)));
+        Data {
+            x: dx,
+            y: dy,
+            about: there - from.pixels[i] - dx * u - dy * v,
         }
-        for i in 0..vectors.len() {
-            let mut sum = [0.0; 2];
-            let mut total = 0.0;
-            let mut add = |weight: f32, j: usize| {
-                total += weight;
-                sum[0] += weight * vectors[j][0];
-                sum[1] += weight * vectors[j][1];
-            };
-            if i % width + 1 < width {
-                add(smooth[i][0], i + 1);
-            }
-            if i / width + 1 < height {
-                add(smooth[i][1], i + width);
-            }
-            if i % width > 0 {
-                add(smooth[i - 1][0], i - 1);
-            }
-            if i >= width {
-                add(smooth[i - width][1], i - width);
-            }
-            let Data {
-                x,
-                y,
-                difference,
-                weight,
-            } = data[i];
-            // Both components at once: a 2 × 2 system.
-            let about = difference - x * start[i][0] - y * start[i][1];
-            let (xx, xy, yy) = (
-                weight * x * x + total,
-                weight * x * y,
-                weight * y * y + total,
-            );
-            let right = [sum[0] - weight * x * about, sum[1] - weight * y * about];
-            let determinant = xx * yy - xy * xy;
-            if determinant <= 0.0 {
-                continue;
-            }
-            let solved = [
-                (yy * right[0] - xy * right[1]) / determinant,
-                (xx * right[1] - xy * right[0]) / determinant,
-            ];
-            for k in 0..2 {
-                vectors[i][k] += OVER * (solved[k] - vectors[i][k]);
-            }
-        }
-    }
+    };
+    start.iter().enumerate().map(of).collect()
 }
 
 /// Median of each component, over three by three pixels.
@@ -298,6 +247,19 @@ fn median(vectors: &[[f32; 2]], [width, height]: [usize; 2]) -> Vec<[f32; 2]> {
     (0..vectors.len())
         .map(|i| {
             let (x, y) = (i % width, i / width);
+            if x > 0 && y > 0 && x + 1 < width && y + 1 < height {
+                let row = |first: usize| -> [[f32; 2]; 3] {
+                    let row = &vectors[first..first + 3];
+                    [row[0], row[1], row[2]]
+                };
+                let [a, b, c] = row(i - width - 1);
+                let [d, e, f] = row(i - 1);
+                let [g, h, j] = row(i + width - 1);
+                let of = |k: usize| {
+                    median_of_nine([a[k], b[k], c[k], d[k], e[k], f[k], g[k], h[k], j[k]])
+                };
+                return [of(0), of(1)];
+            }
             let columns = x.saturating_sub(1)..(x + 2).min(width);
             let mut around = [[0.0; 9]; 2];
             let mut count = 0;
@@ -315,6 +277,49 @@ fn median(vectors: &[[f32; 2]], [width, height]: [usize; 2]) -> Vec<[f32; 2]> {
             })
         })
         .collect()
+}
+
+/// The median by the exchanges of J. L. Smith, *Implementing Median Filters in XC4000E FPGAs*,
+/// Xcell 23 (1996).
+#[inline]
+fn median_of_nine(
+    [
+        mut a,
+        mut b,
+        mut c,
+        mut d,
+        mut e,
+        mut f,
+        mut g,
+        mut h,
+        mut i,
+    ]: [f32; 9],
+) -> f32 {
+    let order = |low: &mut f32, high: &mut f32| {
+        let (one, other) = (*low, *high);
+        *low = if one < other { one } else { other };
+        *high = if one < other { other } else { one };
+    };
+    order(&mut b, &mut c);
+    order(&mut e, &mut f);
+    order(&mut h, &mut i);
+    order(&mut a, &mut b);
+    order(&mut d, &mut e);
+    order(&mut g, &mut h);
+    order(&mut b, &mut c);
+    order(&mut e, &mut f);
+    order(&mut h, &mut i);
+    order(&mut a, &mut d);
+    order(&mut f, &mut i);
+    order(&mut e, &mut h);
+    order(&mut d, &mut g);
+    order(&mut b, &mut e);
+    order(&mut c, &mut f);
+    order(&mut e, &mut h);
+    order(&mut e, &mut c);
+    order(&mut g, &mut e);
+    order(&mut e, &mut c);
+    e
 }
 
 #[cfg(test)]

@@ -70,6 +70,11 @@ impl Codec {
         }
     }
 
+    /// Extension of a film that is named by nobody; `None` of pictures.
+    pub fn film_extension(self) -> Option<&'static str> {
+        self.films().first().copied()
+    }
+
     /// Extension of a picture.
     pub fn extension(self) -> &'static str {
         match self {

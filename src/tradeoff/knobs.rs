@@ -144,7 +144,7 @@ pub(super) static KNOBS: [Knob; 6] = [
         stage: PointStage::Color,
         option: "--rounds",
         count: |base| base.color(|chroma| Some(chroma.iterations as f64)),
-        factors: &[0.5, 0.25],
+        factors: &[0.5, 2.0, 0.25],
         share: 0.5,
         spread: 0.8,
         ..PLAIN

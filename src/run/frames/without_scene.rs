@@ -26,6 +26,8 @@ pub(crate) struct PlainFramesOptions {
     pub teacher: Option<(PathBuf, TeacherSettings)>,
     /// A folder for pictures, or a film by its extension.
     pub output: PathBuf,
+    /// Codec of the film or the pictures; by default by the output's extension and the source.
+    pub codec: Option<Codec>,
     /// Frames a second of a film.
     pub frame_rate: Option<[u32; 2]>,
 }
@@ -44,7 +46,7 @@ pub(crate) fn frames_without_scene(
         source: std::io::ErrorKind::NotFound.into(),
     })?;
     let rate = options.frame_rate.unwrap_or(film.frame_rate);
-    let codec = Codec::of(&options.output, None, film.signal.as_ref())?;
+    let codec = Codec::of(&options.output, options.codec, film.signal.as_ref())?;
     let shots: Vec<Shot> = (film.frames.iter().zip(film.repeats(rate)).enumerate())
         .map(|(index, (name, repeats))| Shot {
             index,

@@ -70,7 +70,7 @@ pub(super) fn streams(place: &Place, film: &str, kind: &str) -> Value {
     let said = Command::new("ffprobe")
         .args(["-v", "error", "-count_frames", "-of", "json"])
         .args(["-select_streams", kind, "-show_entries"])
-        .arg("stream=width,height,r_frame_rate,avg_frame_rate,nb_read_frames,duration")
+        .arg("stream=codec_name,width,height,r_frame_rate,avg_frame_rate,nb_read_frames,duration")
         .arg(place.path(film))
         .output()
         .expect("ffprobe");
