@@ -6,6 +6,7 @@
 //! and with the photo before, along the photo's edges; [`Strokes`] are what somebody painted on
 //! the rest; [`Between`] carries colors to photos without a pose; [`finish`] brings them to full size.
 
+mod align;
 mod between;
 mod blend;
 mod canvas;
@@ -21,4 +22,4 @@ pub use canvas::Canvas;
 pub use finish::{Colored, finish};
 pub use painted::Strokes;
 pub use scene::{SceneDrawer, ViewOf, believable};
-pub use steady::Steadied;
+pub use steady::{Steadied, steady};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Canvas, WeightedColors, window};
+use super::{Canvas, WeightedColors, align::Alignment, window};
 use crate::{
     capture::{Camera, Exposure, View, lens::Undistortion},
     gpu::GpuError,
@@ -46,6 +46,8 @@ pub struct ViewOf<'a> {
     pub camera: &'a Camera,
     /// Exposure of the photo.
     pub exposure: Exposure,
+    /// True if camera and exposure are those of frames before and after.
+    pub is_estimated: bool,
 }
 
 /// The field that is one where a scene of so many Gaussians can be believed: not where the last
@@ -95,16 +97,26 @@ impl<'a> SceneDrawer<'a> {
         for seen in views {
             let drawn = self.renderer.render(seen.camera)?;
             let places = self.places(seen, canvas);
-            for (i, &place) in places.iter().enumerate() {
+            let gray = |place| {
+                Some(255.0 * seen.exposure.shown(f64::from(value(&drawn[0], place)?[0])) as f32)
+            };
+            let alignment = match seen.is_estimated {
+                true => {
+                    let drawn: Vec<Option<f32>> = places.iter().map(|&place| gray(place)).collect();
+                    Alignment::of(&drawn, canvas)
+                }
+                false => Alignment::default(),
+            };
+            for i in 0..places.len() {
                 if grays[i].is_some() {
                     continue;
                 }
+                let place = places[alignment.source(i, canvas)];
                 let at = |picture: usize| value(&drawn[picture], place);
-                let (Some(gray), Some(ab), Some(opacity)) = (at(0), at(1), at(2)) else {
+                let (Some(gray), Some(ab), Some(opacity)) = (gray(place), at(1), at(2)) else {
                     continue;
                 };
-                let shown = 255.0 * seen.exposure.shown(f64::from(gray[0])) as f32;
-                grays[i] = Some([shown, f32::from(canvas.gray[i])]);
+                grays[i] = Some([gray + alignment.lighter, f32::from(canvas.gray[i])]);
                 believed.ab[i] = ab;
                 believed.weight[i] = step(opacity[0], OPAQUE);
             }

@@ -5,12 +5,20 @@
 //! shows at the same point of the same thing, as far as the flow is trusted there. Where it is
 //! not, as in what was hidden before, the frame's own value stands.
 
-use super::{Between, Canvas, ColoredPhoto};
+use super::{Between, Canvas, ColoredPhoto, WeightedColors};
 
 /// Share of the frame before: about ten frames count.
 const KEPT: f32 = 0.9;
 
-/// Colors of frame after frame of a shot.
+/// Moves the colors of a frame, `own`, towards those that the frame before has there: a share of
+/// `kept` where these are trusted.
+pub fn steady(own: &mut [[f32; 2]], before: &WeightedColors, kept: f32) {
+    for ((own, old), weight) in own.iter_mut().zip(&before.ab).zip(&before.weight) {
+        *own = [0, 1].map(|k: usize| own[k] + kept * weight * (old[k] - own[k]));
+    }
+}
+
+/// Colors of frame after frame of a shot without a scene.
 #[derive(Default)]
 pub struct Steadied {
     last: Option<(Canvas, Vec<[f32; 2]>)>,
@@ -18,20 +26,15 @@ pub struct Steadied {
 
 impl Steadied {
     /// The next frame's a and b, `[height, width]`, by its own and the frame before.
-    pub fn next(&mut self, canvas: Canvas, own: Vec<[f32; 2]>) -> &(Canvas, Vec<[f32; 2]>) {
+    pub fn next(&mut self, canvas: Canvas, mut own: Vec<[f32; 2]>) -> &(Canvas, Vec<[f32; 2]>) {
         let between = self.last.as_ref().and_then(|(from, ab)| {
             let step = Between::of(from, &canvas)?;
             Some(ColoredPhoto { canvas: from, ab }.along(&[&step], false, &canvas))
         });
-        let steadied = match between {
-            None => own,
-            Some(before) => (own.iter().zip(&before.ab).zip(&before.weight))
-                .map(|((own, old), weight)| {
-                    [0, 1].map(|k: usize| own[k] + KEPT * weight * (old[k] - own[k]))
-                })
-                .collect(),
-        };
-        self.last.insert((canvas, steadied))
+        if let Some(before) = between {
+            steady(&mut own, &before, KEPT);
+        }
+        self.last.insert((canvas, own))
     }
 }
 

@@ -16,8 +16,8 @@ use crate::{
 const BAKE_VIEWS: usize = 16;
 
 /// Rounds of the bake, all at full size: pictures of half the size are blurred otherwise, and
-/// what is right for them is wrong for these. More bring one percent (docs/lab/08-bake.md).
-const BAKE_ROUNDS: usize = 12;
+/// what is right for them is wrong for these. Twelve bring one percent (docs/lab/08-bake.md).
+const BAKE_ROUNDS: usize = 8;
 
 /// Fits RGB harmonics, up to the degree of `settings`, to the colored pictures of `tasks`:
 /// what training RGB splats on a teacher's pictures would give on this geometry.

@@ -1,6 +1,7 @@
 //! `frames`: the photos themselves in color.
 
 mod changes;
+mod estimated;
 mod out;
 mod painted;
 mod painter;
@@ -14,6 +15,7 @@ pub(crate) use without_scene::{PlainFramesOptions, frames_without_scene};
 use std::{cell::RefCell, path::PathBuf};
 
 use changes::{Changes, FrameSources};
+use estimated::estimate;
 use out::FrameOutput;
 use painted::Painted;
 use painter::Painter;
@@ -29,7 +31,7 @@ use crate::{
     capture::{Dataset, Film, LoadOptions},
     chroma::teacher::TeacherSettings,
     eval::exposures,
-    frames::{Canvas, SceneDrawer, Strokes, WeightedColors, believable, blend, finish},
+    frames::{Canvas, SceneDrawer, Strokes, WeightedColors, believable, blend, finish, steady},
     gpu::Gpu,
     report::Report,
     store::{Codec, RunFolder, film::FRAME_RATE, is_film, originals::OriginalFiles},
@@ -43,6 +45,9 @@ use crate::{
 
 /// A share of a photo that the scene leaves open from which on the photo before is asked.
 const OPEN: f64 = 0.005;
+
+/// Share of the colors of a film's frame that stays in the next one: about three frames count.
+const STEADIED: f32 = 0.7;
 
 /// Pixels of photos without a pose, 2 bytes each, that wait for the next one with a pose; of more
 /// photos the files are read again.
@@ -79,7 +84,7 @@ pub struct Frames {
     pub codec: Codec,
     /// Photos in color.
     pub photos: usize,
-    /// Photos with a pose.
+    /// Photos with a pose, those included whose pose is taken between their neighbors'.
     pub placed: usize,
     /// Photos with colors carried from their neighbors.
     pub carried: usize,
@@ -137,10 +142,18 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     observe(Event::begins(Stage::Device));
     let raster = report.luma.settings.raster(&Gpu::open()?);
     let believed = believable(luma.len(), report.luma.surroundings);
+    let estimated = estimate(&dataset, &shots);
+    let between = estimated.iter().flatten().count();
+    if between > 0 {
+        observe(Event::Note(format!(
+            "the camera stands or turns: {between} photos without a pose take one between their neighbors'"
+        )));
+    }
     let mut painter = Painter {
         drawer: SceneDrawer::new(&raster, &luma, [&chroma, &believed], dataset.extent)?,
         exposures: exposures(&dataset, &report.luma.exposures),
         dataset: &dataset,
+        estimated: &estimated,
         teachers,
         range: own_range(&dataset, film.as_ref(), &shots, observe),
         side: None,
@@ -152,6 +165,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
         painter,
         out,
         teacher_alone: options.teacher_alone,
+        is_film: film.is_some(),
         last: None,
         open: Vec::new(),
         kept: 0,
@@ -206,6 +220,8 @@ struct Coloring<'a> {
     painter: Painter<'a>,
     out: FrameOutput,
     teacher_alone: bool,
+    /// True if the photos are frames of a film, one after the other.
+    is_film: bool,
     /// The last photo with a pose.
     last: Option<Known>,
     /// Photos without one since.
@@ -234,7 +250,7 @@ impl<'a> Coloring<'a> {
             observe(Event::progress(Stage::Coloring, done, count, &*shot.name));
             let strokes = painted.on(index);
             self.told.painted += usize::from(strokes.is_some());
-            match shot.views.is_empty() {
+            match self.painter.views(shot).is_empty() {
                 true => self.wait(index, shot, strokes),
                 false => self.color(shot, strokes)?,
             }
@@ -273,7 +289,8 @@ impl<'a> Coloring<'a> {
         };
         let steps = match &self.last {
             Some(last)
-                if !self.teacher_alone && (!self.open.is_empty() || 1.0 - seen.share() > OPEN) =>
+                if !self.teacher_alone
+                    && (self.is_film || !self.open.is_empty() || 1.0 - seen.share() > OPEN) =>
             {
                 way(&last.canvas, &self.open, Some(&canvas))
             }
@@ -294,9 +311,12 @@ impl<'a> Coloring<'a> {
         });
         let views = self.painter.views(shot);
         let answer = (self.painter).answer(&shot.name, views.first(), &canvas)?;
-        let ab = blend(&canvas, &seen, answer.as_deref(), before.as_ref());
+        let mut ab = blend(&canvas, &seen, answer.as_deref(), before.as_ref());
+        if let (true, Some(before)) = (self.is_film, &before) {
+            steady(&mut ab, before, STEADIED);
+        }
         let shares = changes::placed(&seen, before.as_ref(), answer.is_some(), strokes);
-        let (index, pose) = (shot.index, true);
+        let (index, pose) = (shot.index, !shot.views.is_empty());
         self.sources.push(FrameSources {
             index,
             pose,

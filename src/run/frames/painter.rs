@@ -1,6 +1,6 @@
 //! Sources of a photo's colors.
 
-use super::shots::Shot;
+use super::{estimated::EstimatedView, shots::Shot};
 use crate::{
     capture::{CaptureError, Dataset, Exposure, Normalize, Original, View},
     chroma::teacher::AbImage,
@@ -13,6 +13,8 @@ pub(super) struct Painter<'a> {
     pub drawer: SceneDrawer<'a>,
     pub exposures: Vec<Exposure>,
     pub dataset: &'a Dataset,
+    /// Of each photo without a pose the one that it should have, if that is known.
+    pub estimated: &'a [Option<EstimatedView>],
     pub teachers: Option<Teachers>,
     /// Values that become black and white in pictures of photos with more than 8 bits.
     pub range: Normalize,
@@ -34,14 +36,21 @@ impl<'a> Painter<'a> {
         }
     }
 
+    /// Views of a photo, the estimated one where it has no pose.
     pub fn views(&self, shot: &Shot) -> Vec<ViewOf<'a>> {
         let dataset = self.dataset;
         let of = |i: usize| ViewOf {
             view: &dataset.capture.views[i],
             camera: &dataset.cameras[i],
             exposure: self.exposures[i],
+            is_estimated: false,
         };
-        shot.views.clone().map(of).collect()
+        let estimated = self.estimated[shot.index].as_ref().map(|estimated| ViewOf {
+            camera: &estimated.camera,
+            is_estimated: true,
+            ..of(estimated.nearest)
+        });
+        shot.views.clone().map(of).chain(estimated).collect()
     }
 
     /// A photo with a pose at the size at which its views were trained.
@@ -69,6 +78,7 @@ impl<'a> Painter<'a> {
             view,
             camera: &self.dataset.cameras[0],
             exposure: Exposure::NONE,
+            is_estimated: false,
         };
         let [width, height] = SceneDrawer::size(&[seen])?;
         let size = self.dataset.loader().seen(view).ok()?.0;
@@ -90,7 +100,8 @@ impl<'a> Painter<'a> {
         let Some(teachers) = &mut self.teachers else {
             return Ok(None);
         };
-        let name = view.map_or(name, |seen| &seen.view.photo);
+        let placed = view.filter(|seen| !seen.is_estimated);
+        let name = placed.map_or(name, |seen| &seen.view.photo);
         let answer = teachers.color(canvas.query(name), canvas.gray_image())?;
         Ok(answer.map(|AbImage { ab, .. }| ab))
     }
