@@ -17,10 +17,10 @@ pub(super) struct EstimatedView {
 /// taken from one place: a camera that stands or turns does so evenly, but for gate weave of some
 /// pixels, which [`SceneDrawer`](crate::frames::SceneDrawer) finds. `None` for frames with a pose,
 /// and between two lenses that differ by more than zoom.
-pub(super) fn estimate(dataset: &Dataset, shots: &[Shot]) -> Vec<Option<EstimatedView>> {
-    if !dataset.capture.is_panorama() {
+pub(super) fn estimate(film: Option<&Dataset>, shots: &[Shot]) -> Vec<Option<EstimatedView>> {
+    let Some(dataset) = film.filter(|dataset| dataset.capture.is_panorama()) else {
         return shots.iter().map(|_| None).collect();
-    }
+    };
     // Faces of wide photos have poses of their own.
     let placed = shots.iter().filter(|shot| shot.views.len() == 1);
     let placed: Vec<(usize, usize)> = placed.map(|shot| (shot.index, shot.views.start)).collect();
@@ -39,17 +39,20 @@ pub(super) fn estimate(dataset: &Dataset, shots: &[Shot]) -> Vec<Option<Estimate
         let share = if first == last { 0.0 } else { share };
         Some(EstimatedView {
             nearest: if share < 0.5 { first.1 } else { last.1 },
-            camera: between(dataset, [first.1, last.1], share)?,
+            camera: {
+                let views = [first.1, last.1];
+                let [one, other] = views.map(|view| &dataset.capture.views[view].undistortion);
+                let cameras = views.map(|view| &dataset.cameras[view]);
+                (one == other).then(|| between(cameras, share)).flatten()?
+            },
         })
     };
     shots.iter().map(of).collect()
 }
 
-/// The camera between two views'; `None` if their lenses differ by more than zoom.
-fn between(dataset: &Dataset, views: [usize; 2], share: f64) -> Option<Camera> {
-    let [a, b] = views.map(|view| &dataset.cameras[view]);
-    let [first, second] = views.map(|view| &dataset.capture.views[view].undistortion);
-    if [a.width, a.height] != [b.width, b.height] || first != second {
+/// The camera at a share of the way from one to another; `None` if their sizes differ.
+fn between([a, b]: [&Camera; 2], share: f64) -> Option<Camera> {
+    if [a.width, a.height] != [b.width, b.height] {
         return None;
     }
     let mix = |from: f64, to: f64| from + share * (to - from);
@@ -66,4 +69,37 @@ fn between(dataset: &Dataset, views: [usize; 2], share: f64) -> Option<Camera> {
         rotation,
         translation: -(rotation * center),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    #[test]
+    fn half_way_a_camera_has_turned_and_zoomed_by_half_about_its_place() {
+        let center = DVec3::new(1.0, -2.0, 0.5);
+        let turned = |angle: f64, focal: f64| {
+            let rotation = DMat3::from_rotation_y(angle);
+            Camera {
+                width: 40,
+                height: 30,
+                fx: focal,
+                fy: focal,
+                cx: 20.0,
+                cy: 15.0,
+                rotation,
+                translation: -(rotation * center),
+            }
+        };
+        let (first, last) = (turned(0.1, 50.0), turned(0.5, 70.0));
+        let found = between([&first, &last], 0.5).expect("one size");
+        let wanted = turned(0.3, 60.0);
+        assert!(found.rotation.abs_diff_eq(wanted.rotation, 1e-12));
+        assert!(found.center().abs_diff_eq(center, 1e-12));
+        assert_eq!([found.fx, found.cx], [60.0, 20.0]);
+        let small = Camera { width: 20, ..last };
+        assert!(between([&first, &small], 0.5).is_none());
+    }
 }

@@ -142,7 +142,7 @@ pub fn frames(options: &FramesOptions, observe: &mut Observer<'_>) -> Result<Fra
     observe(Event::begins(Stage::Device));
     let raster = report.luma.settings.raster(&Gpu::open()?);
     let believed = believable(luma.len(), report.luma.surroundings);
-    let estimated = estimate(&dataset, &shots);
+    let estimated = estimate(film.as_ref().map(|_| &dataset), &shots);
     let between = estimated.iter().flatten().count();
     if between > 0 {
         observe(Event::Note(format!(
