@@ -1,0 +1,72 @@
+//! Settings in keywords, in the place of the library's defaults.
+
+use pyo3::{
+    exceptions::{PyTypeError, PyValueError},
+    prelude::*,
+    types::{PyDict, PyString},
+};
+use serde::{Serialize, de::DeserializeOwned};
+use serde_json::{Map, Value};
+
+/// `defaults` with the values of `keywords` in their place, by the names that reports have.
+///
+/// # Errors
+/// `TypeError` for an unknown keyword, `ValueError` for a value that is none of its setting.
+pub fn overlaid<T: Serialize + DeserializeOwned>(
+    defaults: &T,
+    keywords: Option<&Bound<'_, PyDict>>,
+) -> PyResult<T> {
+    let unreadable = |error: serde_json::Error| PyValueError::new_err(error.to_string());
+    let Value::Object(mut settings) = serde_json::to_value(defaults).map_err(unreadable)? else {
+        return Err(PyTypeError::new_err("these settings have no names"));
+    };
+    if let Some(keywords) = keywords {
+        for (name, value) in of_python::<Map<String, Value>>(keywords)? {
+            let Some(setting) = settings.get_mut(&name) else {
+                let known: Vec<&str> = settings.keys().map(String::as_str).collect();
+                let known = known.join(", ");
+                let reason = format!("there is no setting {name}; there are {known}");
+                return Err(PyTypeError::new_err(reason));
+            };
+            let before = std::mem::replace(setting, value);
+            if let Err(error) = serde_json::from_value::<T>(Value::Object(settings.clone())) {
+                let reason = format!("{name}: {error} [default: {before}]");
+                return Err(PyValueError::new_err(reason));
+            }
+        }
+    }
+    serde_json::from_value(Value::Object(settings)).map_err(unreadable)
+}
+
+/// A value of Python's, by way of JSON.
+pub fn of_python<T: DeserializeOwned>(value: &Bound<'_, PyAny>) -> PyResult<T> {
+    let options = PyDict::new(value.py());
+    // Paths, and NumPy's numbers.
+    options.set_item("default", value.py().import("gs_chroma._plain")?.getattr("plain")?)?;
+    let json = value.py().import("json")?;
+    let text = json.call_method("dumps", (value,), Some(&options))?;
+    let text = text.cast::<PyString>()?.to_str()?.to_owned();
+    serde_json::from_str(&text).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+/// A value for Python, by way of JSON: dictionaries, lists, numbers, strings.
+pub fn to_python<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(value);
+    let text = text.map_err(|error| PyValueError::new_err(error.to_string()))?;
+    py.import("json")?.call_method1("loads", (text,))
+}
+
+/// Refuses a number out of its range.
+pub fn within<T: PartialOrd + std::fmt::Display>(
+    name: &str,
+    value: T,
+    [least, most]: [T; 2],
+) -> PyResult<()> {
+    // NaN fails the comparison.
+    match value >= least && value <= most {
+        true => Ok(()),
+        false => Err(PyValueError::new_err(format!(
+            "{name}: {value} is not from {least} to {most}"
+        ))),
+    }
+}
