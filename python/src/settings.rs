@@ -3,7 +3,7 @@
 use pyo3::{
     exceptions::{PyTypeError, PyValueError},
     prelude::*,
-    types::{PyDict, PyString},
+    types::{PyCFunction, PyDict, PyString, PyTuple},
 };
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
@@ -40,13 +40,23 @@ pub fn overlaid<T: Serialize + DeserializeOwned>(
 
 /// A value of Python's, by way of JSON.
 pub fn of_python<T: DeserializeOwned>(value: &Bound<'_, PyAny>) -> PyResult<T> {
-    let options = PyDict::new(value.py());
-    // Paths, and NumPy's numbers.
-    options.set_item("default", value.py().import("gs_chroma._plain")?.getattr("plain")?)?;
-    let json = value.py().import("json")?;
+    let py = value.py();
+    let options = PyDict::new(py);
+    options.set_item("default", PyCFunction::new_closure(py, None, None, plain)?)?;
+    let json = py.import("json")?;
     let text = json.call_method("dumps", (value,), Some(&options))?;
     let text = text.cast::<PyString>()?.to_str()?.to_owned();
     serde_json::from_str(&text).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+/// What JSON has no words for: NumPy's numbers and arrays, and paths.
+fn plain(words: &Bound<'_, PyTuple>, _: Option<&Bound<'_, PyDict>>) -> PyResult<Py<PyAny>> {
+    let value = words.get_item(0)?;
+    let plain = match value.hasattr("tolist")? {
+        true => value.call_method0("tolist")?,
+        false => words.py().import("os")?.call_method1("fspath", (value,))?,
+    };
+    Ok(plain.unbind())
 }
 
 /// A value for Python, by way of JSON: dictionaries, lists, numbers, strings.
