@@ -1,8 +1,6 @@
 //! Arrays of NumPy, and of whoever can become one.
 
-use numpy::{
-    IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
-};
+use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
 
 /// Anything that NumPy takes as an array; PyTorch's tensors leave graph and device.

@@ -53,8 +53,16 @@ impl Camera {
         // Rows come first in NumPy, columns in glam.
         let rotation = DMat3::from_cols_array(&rotation).transpose();
         let off = rotation * rotation.transpose() - DMat3::IDENTITY;
-        let off = off.to_cols_array().map(f64::abs).into_iter().fold(0.0, f64::max);
-        within("rotation's distance from an orthonormal matrix", off, [0.0, SLACK])?;
+        let off = off
+            .to_cols_array()
+            .map(f64::abs)
+            .into_iter()
+            .fold(0.0, f64::max);
+        within(
+            "rotation's distance from an orthonormal matrix",
+            off,
+            [0.0, SLACK],
+        )?;
         within("rotation's determinant", rotation.determinant(), [0.5, 1.5])?;
         Ok(Self(capture::Camera {
             width,
@@ -131,7 +139,13 @@ impl Camera {
     }
 
     fn __repr__(&self) -> String {
-        let capture::Camera { width, height, fx, fy, .. } = &self.0;
+        let capture::Camera {
+            width,
+            height,
+            fx,
+            fy,
+            ..
+        } = &self.0;
         format!("Camera({width} x {height}, fx={fx:.2}, fy={fy:.2})")
     }
 }

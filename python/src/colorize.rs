@@ -8,7 +8,6 @@ use gs_chroma::{
         self, ChromaError, ChromaProgress, ChromaSettings, ColorizeEvent, Degree, Distill,
         SolverKind, native_rgb, teach, teacher::TeacherSettings,
     },
-    luma::Preset,
     raster::{Raster, RasterOptions, RenderedImage, SceneRenderer},
     splats::{self, sh::coefficient_count},
 };
@@ -30,6 +29,9 @@ use crate::{
     splats::Splats,
     teacher::Teacher,
 };
+
+/// Iterations of Adam, as the code of ChromaDistill has them.
+const ADAM_ITERATIONS: usize = 3_000;
 
 /// A colored scene.
 #[pyclass(frozen, module = "gs_chroma")]
@@ -56,7 +58,11 @@ impl Colored {
     #[getter]
     fn chroma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let field = &self.colored.chroma;
-        let shape = [self.colored.splats.len(), coefficient_count(field.degree), 2];
+        let shape = [
+            self.colored.splats.len(),
+            coefficient_count(field.degree),
+            2,
+        ];
         of_shape(py, field.coefficients.clone(), &shape)
     }
 
@@ -159,7 +165,10 @@ pub fn colorize(
         let colored = job.run(&mut teacher, &mut reporter);
         reporter.end(colored)
     })?;
-    teacher.doubts()?.iter().try_for_each(|doubt| warn(py, doubt))?;
+    teacher
+        .doubts()?
+        .iter()
+        .try_for_each(|doubt| warn(py, doubt))?;
     Ok(Colored {
         colored,
         dataset: job.dataset,
@@ -173,18 +182,30 @@ fn subject(
     dataset: Option<&Dataset>,
 ) -> PyResult<(Arc<Photos>, splats::Splats, RasterOptions, u64)> {
     if let Ok(trained) = scene.cast::<LumaScene>() {
-        let LumaScene { scene, dataset: own } = trained.get();
+        let LumaScene {
+            scene,
+            dataset: own,
+        } = trained.get();
         if dataset.is_some_and(|other| !Arc::ptr_eq(&other.0, own)) {
-            return Err(PyValueError::new_err("dataset: the scene was trained on another"));
+            return Err(PyValueError::new_err(
+                "dataset: the scene was trained on another",
+            ));
         }
         let drawn = scene.settings.raster_options();
-        return Ok((own.clone(), scene.splats.clone(), drawn, scene.settings.seed));
+        return Ok((
+            own.clone(),
+            scene.splats.clone(),
+            drawn,
+            scene.settings.seed,
+        ));
     }
     let splats = scene.cast::<Splats>().map_err(|_| {
         PyTypeError::new_err("scene: a LumaScene, or Splats together with a dataset")
     })?;
     let Some(dataset) = dataset else {
-        return Err(PyTypeError::new_err("dataset: Splats need the photos that they show"));
+        return Err(PyTypeError::new_err(
+            "dataset: Splats need the photos that they show",
+        ));
     };
     let splats = splats.get();
     if splats.splats.is_empty() {
@@ -203,7 +224,7 @@ fn chroma_settings(keywords: Option<&Bound<'_, PyDict>>, seed: u64) -> PyResult<
     let solver = keywords.map(|keywords| keywords.get_item("solver"));
     let solver = solver.transpose()?.flatten();
     let defaults = match solver.as_ref().map(of_python).transpose()? {
-        Some(SolverKind::Adam) => ChromaSettings::adam(Preset::Draft.settings().iterations),
+        Some(SolverKind::Adam) => ChromaSettings::adam(ADAM_ITERATIONS),
         Some(SolverKind::Irls) | None => ChromaSettings::irls(),
     };
     let settings = overlaid(&ChromaSettings { seed, ..defaults }, keywords)?;
@@ -257,7 +278,9 @@ impl Job {
                 ColorizeEvent::Trying { progress, .. } => solving("SH degree", progress),
                 ColorizeEvent::Solving(progress) => solving("solving", progress),
                 ColorizeEvent::Baking(progress) => solving("baking", progress),
-                ColorizeEvent::Matching { view, total } => Progress::of("matching", view, total, ""),
+                ColorizeEvent::Matching { view, total } => {
+                    Progress::of("matching", view, total, "")
+                }
                 ColorizeEvent::Drawing { view, total } => Progress::of("drawing", view, total, ""),
                 _ => return std::ops::ControlFlow::Continue(()),
             })

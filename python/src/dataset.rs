@@ -46,12 +46,16 @@ impl Dataset {
                     Notice::LeftOut(left_out) => {
                         reporter.warn(&format!("left out {}: {}", left_out.name, left_out.reason))
                     }
-                    Notice::Sampled { done, total, name } => reporter.tell(Progress::of("photos", done, total, name)),
+                    Notice::Sampled { done, total, name } => {
+                        reporter.tell(Progress::of("photos", done, total, name))
+                    }
                     Notice::Normalized(_) => return,
                 };
                 ended |= told.is_break();
             });
-            reporter.end(python(opened)).map(|dataset| Self(Arc::new(dataset)))
+            reporter
+                .end(python(opened))
+                .map(|dataset| Self(Arc::new(dataset)))
         })
     }
 

@@ -1,8 +1,6 @@
 //! Exceptions: one tree, whose branches are the library's errors.
 
-use gs_chroma::{
-    capture, chroma, chroma::teacher, gpu, low_level::AnswerError, luma, splats,
-};
+use gs_chroma::{capture, chroma, chroma::teacher, gpu, low_level::AnswerError, luma, splats};
 use pyo3::{
     PyErr, create_exception,
     exceptions::{PyException, PyTypeError},
@@ -15,8 +13,18 @@ create_exception!(
     Error,
     "Photos or their model cannot be loaded."
 );
-create_exception!(gs_chroma, GpuError, Error, "The device failed or is missing.");
-create_exception!(gs_chroma, LumaError, Error, "The training of a gray scene failed.");
+create_exception!(
+    gs_chroma,
+    GpuError,
+    Error,
+    "The device failed or is missing."
+);
+create_exception!(
+    gs_chroma,
+    LumaError,
+    Error,
+    "The training of a gray scene failed."
+);
 create_exception!(gs_chroma, ChromaError, Error, "A scene cannot be colored.");
 create_exception!(
     gs_chroma,
@@ -30,7 +38,12 @@ create_exception!(
     Error,
     "A splat file cannot be read or written."
 );
-create_exception!(gs_chroma, CommandError, Error, "A command on a run folder failed.");
+create_exception!(
+    gs_chroma,
+    CommandError,
+    Error,
+    "A command on a run folder failed."
+);
 
 /// Error of the library on its way to Python.
 pub trait IntoPython {

@@ -167,7 +167,10 @@ impl Job {
         dataset.visit(&views, |view, photo| {
             survey.look(view, photo);
             let name = &dataset.capture.views[view].name;
-            match reporter.tell(Progress::of("photos", view, views.len(), name)).is_break() {
+            match reporter
+                .tell(Progress::of("photos", view, views.len(), name))
+                .is_break()
+            {
                 true => Err(luma::LumaError::Cancelled),
                 false => Ok(()),
             }
@@ -188,12 +191,16 @@ impl Job {
             album: false,
         };
         fit.run(settings, &mut |event| match event {
-            LumaEvent::Examined { view, total } => reporter.tell(Progress::of("photos", view, total, "")),
-            LumaEvent::Trial(trial) => reporter.tell(Progress::of("trial", trial.done, trial.total, "")),
+            LumaEvent::Examined { view, total } => {
+                reporter.tell(Progress::of("photos", view, total, ""))
+            }
+            LumaEvent::Trial(trial) => {
+                reporter.tell(Progress::of("trial", trial.done, trial.total, ""))
+            }
             LumaEvent::Placing => reporter.tell(Progress::of("placing", 0, 0, "")),
-            LumaEvent::Capped(fits) => reporter.warn(&format!(
-                "the device has room for {fits} Gaussians only"
-            )),
+            LumaEvent::Capped(fits) => {
+                reporter.warn(&format!("the device has room for {fits} Gaussians only"))
+            }
             LumaEvent::Starting { iteration, end } => {
                 reporter.tell(Progress::of("training", iteration, end, ""))
             }

@@ -58,7 +58,9 @@ fn shown(scene: &Bound<'_, PyAny>) -> PyResult<(Splats, Option<f64>)> {
     }
     match scene.cast::<Splats>() {
         Ok(splats) => Ok((splats.get().clone(), None)),
-        Err(_) => Err(PyTypeError::new_err("scene: Splats, a LumaScene or Colored")),
+        Err(_) => Err(PyTypeError::new_err(
+            "scene: Splats, a LumaScene or Colored",
+        )),
     }
 }
 

@@ -20,18 +20,21 @@ pub fn overlaid<T: Serialize + DeserializeOwned>(
     let Value::Object(mut settings) = serde_json::to_value(defaults).map_err(unreadable)? else {
         return Err(PyTypeError::new_err("these settings have no names"));
     };
+    let known: Vec<String> = settings.keys().cloned().collect();
     if let Some(keywords) = keywords {
         for (name, value) in of_python::<Map<String, Value>>(keywords)? {
-            let Some(setting) = settings.get_mut(&name) else {
-                let known: Vec<&str> = settings.keys().map(String::as_str).collect();
+            let before = settings.insert(name.clone(), value.clone());
+            let read: T =
+                serde_json::from_value(Value::Object(settings.clone())).map_err(|error| {
+                    let before = before.unwrap_or_default();
+                    PyValueError::new_err(format!("{name}: {error} [default: {before}]"))
+                })?;
+            // Some are left out of JSON while they are null.
+            let taken = serde_json::to_value(&read).map_err(unreadable)?;
+            if taken.get(&name).is_none() && !value.is_null() {
                 let known = known.join(", ");
                 let reason = format!("there is no setting {name}; there are {known}");
                 return Err(PyTypeError::new_err(reason));
-            };
-            let before = std::mem::replace(setting, value);
-            if let Err(error) = serde_json::from_value::<T>(Value::Object(settings.clone())) {
-                let reason = format!("{name}: {error} [default: {before}]");
-                return Err(PyValueError::new_err(reason));
             }
         }
     }

@@ -53,7 +53,11 @@ impl Splats {
             opacity_logits: logits(opacity_logits, count)?,
             sh: field(sh, count)?,
         };
-        if splats.quats.iter().any(|q| q.iter().all(|&value| value == 0.0)) {
+        if splats
+            .quats
+            .iter()
+            .any(|q| q.iter().all(|&value| value == 0.0))
+        {
             return Err(PyValueError::new_err("quaternions: one is zero"));
         }
         let offset = offset.map(|offset| exactly("offset", offset, &[3]));
@@ -72,7 +76,10 @@ impl Splats {
         let shown = path.display();
         if read.skipped > 0 {
             let count = read.skipped;
-            warn(py, &format!("{shown}: {count} Gaussians are not finite, and left out"))?;
+            warn(
+                py,
+                &format!("{shown}: {count} Gaussians are not finite, and left out"),
+            )?;
         }
         for doubt in &read.doubts {
             warn(py, &format!("{shown}: {doubt}"))?;
@@ -285,5 +292,11 @@ fn field(value: &Bound<'_, PyAny>, count: usize) -> PyResult<ShField> {
             }),
         _ => None,
     };
-    found.ok_or_else(|| shape_error("sh", &shape, &format!("[{count}, 1, 4, 9 or 16, 1, 2 or 3]")))
+    found.ok_or_else(|| {
+        shape_error(
+            "sh",
+            &shape,
+            &format!("[{count}, 1, 4, 9 or 16, 1, 2 or 3]"),
+        )
+    })
 }

@@ -74,7 +74,9 @@ impl Teacher {
             true => dataset.capture.root.join(IMAGES),
             false => path,
         };
-        let opened = teacher.py().detach(|| teacher::Teacher::open(&path, None, settings));
+        let opened = teacher
+            .py()
+            .detach(|| teacher::Teacher::open(&path, None, settings));
         let mut opened = python(opened)?;
         opened.know(&dataset.capture);
         let mut partial = false;
@@ -138,7 +140,10 @@ impl Callable {
         let size = [photo.width, photo.height];
         let [width, height] = upright.size(size);
         let gray = upright.turned(photo.pixels.to_vec(), 1, size);
-        let gray = gray.into_iter().map(|value| f32::from(value) / 255.0).collect();
+        let gray = gray
+            .into_iter()
+            .map(|value| f32::from(value) / 255.0)
+            .collect();
         let gray = of_shape::<f32>(py, gray, &[height as usize, width as usize])?;
         let answer = self.call.bind(py).call1((gray,))?;
         if answer.is_none() {
@@ -146,7 +151,9 @@ impl Callable {
         }
         let ab = self.colors(&format!("the teacher's answer for {name}"), &answer)?;
         let upsample = self.upsample;
-        Ok(Some(py.detach(|| ab.turned(upright.inverse()).upsampled(photo, upsample))))
+        Ok(Some(py.detach(|| {
+            ab.turned(upright.inverse()).upsampled(photo, upsample)
+        })))
     }
 
     /// a and b of an answer: a and b themselves, or RGB.
@@ -160,8 +167,15 @@ impl Callable {
                 (numbers.as_chunks().0.to_vec(), height, width)
             }
             [height @ 1.., width @ 1.., 3] => {
-                let (white, slack) = if bytes { (255.0, 0.0) } else { (1.0, RGB_SLACK) };
-                if numbers.iter().any(|value| *value < -slack || *value > white + slack) {
+                let (white, slack) = if bytes {
+                    (255.0, 0.0)
+                } else {
+                    (1.0, RGB_SLACK)
+                };
+                if numbers
+                    .iter()
+                    .any(|value| *value < -slack || *value > white + slack)
+                {
                     let reason = format!("{name}: RGB is uint8, or floats from 0 to 1");
                     return Err(PyValueError::new_err(reason));
                 }
@@ -174,12 +188,16 @@ impl Callable {
                 (ab.collect(), height, width)
             }
             [2 | 3, _, _] => {
-                let wanted = format!("{wanted}: move the channels behind, as permute(1, 2, 0) does");
+                let wanted =
+                    format!("{wanted}: move the channels behind, as permute(1, 2, 0) does");
                 return Err(shape_error(name, &shape, &wanted));
             }
             _ => return Err(shape_error(name, &shape, wanted)),
         };
-        let largest = ab.as_flattened().iter().fold(0.0, |most: f32, value| most.max(value.abs()));
+        let largest = ab
+            .as_flattened()
+            .iter()
+            .fold(0.0, |most: f32, value| most.max(value.abs()));
         if largest > AB_MOST {
             let reason = format!("{name}: no CIELAB a or b is {largest}");
             return Err(TeacherError::new_err(reason));
