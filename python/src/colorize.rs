@@ -131,6 +131,13 @@ struct Job {
     correct_views: Option<bool>,
 }
 
+/// Colors a gray scene, or Gaussians of another program together with their `dataset`.
+///
+/// A teacher is a callable, asked once for each photo: gray float32 `[H, W]` in 0 to 1, upright,
+/// in; CIELAB a and b `[h, w, 2]`, or RGB `[h, w, 3]` as uint8 or floats from 0 to 1, or `None`,
+/// out. The answer may be of any size, an array or a tensor on any device. Or it is the path of an
+/// .onnx file or of a folder of colored photos, the name of a network (`gs-chroma teacher list`),
+/// or `photos`, whose own colors are meant. An exception of the callable comes back as it is.
 #[pyfunction]
 #[pyo3(signature = (scene, teacher, *, dataset=None, sh_degree=None, correct_views=None, network=None, progress=None, **settings))]
 #[allow(

@@ -28,6 +28,10 @@ pub struct Dataset(pub Arc<capture::Dataset>);
 
 #[pymethods]
 impl Dataset {
+    /// Opens a COLMAP folder with images/ and sparse/.
+    ///
+    /// `max_side` is the longer side that larger photos are scaled to, in pixels. Every 8th view
+    /// is held out, unless `holdout=False`. What is left out or doubtful is a warning.
     #[staticmethod]
     #[pyo3(signature = (dir, *, progress=None, **options))]
     fn open(

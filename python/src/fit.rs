@@ -85,6 +85,12 @@ struct Job {
     start: Option<gs_chroma::splats::Splats>,
 }
 
+/// Trains a gray scene, geometry and luminance.
+///
+/// `preset` is by default `paper` on a GPU, `draft` without one; it does not change the photos'
+/// size. `start` are Gaussians to begin with instead of COLMAP's points. `memory_limit` is in
+/// bytes of the device. `progress` is called with a `Progress`; an exception that it raises, or
+/// Ctrl-C, ends the training.
 #[pyfunction]
 #[pyo3(signature = (dataset, *, preset=None, sh_degree=None, with_effects=None, without_effects=None, start=None, progress=None, **settings))]
 #[allow(

@@ -21,6 +21,10 @@ use crate::{
 /// Share of the Gaussians whose radius stands for the extent of a scene without photos.
 const MOST: f64 = 0.9;
 
+/// A picture of a scene: gray `[height, width]`, RGB `[height, width, 3]`, both sRGB in 0 to 1, or
+/// CIELAB a and b `[height, width, 2]`; float32.
+///
+/// Nothing nearer than `near`, in world units, is shown; by default a hundredth of the extent.
 #[pyfunction]
 #[pyo3(signature = (scene, camera, *, near=None))]
 pub fn render<'py>(
