@@ -1,6 +1,6 @@
 """A whole job from Python: photos with poses in, colored pictures and a colored splat file out.
 
-    pip install gs-chroma pillow
+    pip install pillow      # beside gs_chroma: docs/python.md
     python examples/color_scene.py COLMAP_DIR OUT
 """
 

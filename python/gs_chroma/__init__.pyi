@@ -58,10 +58,9 @@ class Progress:
     """Number of Gaussians, while they are trained."""
 
 class Camera:
-    """A pinhole camera with its pose, as COLMAP defines them.
-
-    Axes: x right, y down, z forward. A point X of the world is at `rotation @ X + translation`.
-    The center of the top left pixel is at (0.5, 0.5).
+    """A pinhole camera with its pose, as COLMAP defines them: axes x right, y down, z forward; a
+    point X of the world is at `rotation @ X + translation`; the center of the top left pixel is at
+    (0.5, 0.5).
     """
 
     width: int
@@ -77,11 +76,11 @@ class Camera:
     cy: float
     """Vertical principal point in pixels."""
     rotation: _Float64
-    """World-to-camera rotation, [3, 3]."""
+    """World-to-camera rotation, float64 [3, 3]."""
     translation: _Float64
-    """World-to-camera translation in world units, [3]."""
+    """World-to-camera translation in world units, float64 [3]."""
     center: _Float64
-    """The camera's center in world units, [3]."""
+    """The camera's center in world units, float64 [3]."""
 
     def __init__(
         self,
@@ -95,7 +94,7 @@ class Camera:
         translation: ArrayLike,
     ) -> None: ...
     def resized(self, width: int, height: int) -> Camera:
-        """The same view at another size, in pixels."""
+        """The same view at another size."""
 
 class LoadOptions(TypedDict, total=False):
     """Options of loading photos; docs/run-folder.md describes them (`capture.load`)."""
@@ -110,7 +109,9 @@ class LoadOptions(TypedDict, total=False):
     masked: Literal["ignore", "remove"]
 
 class Dataset:
-    """Photos of a COLMAP folder with their cameras, at working size."""
+    """Photos of a COLMAP folder with their cameras, at working size. Photos are decoded when they
+    are asked for.
+    """
 
     names: list[str]
     """Name of each view: its photo's path below images/."""
@@ -121,13 +122,17 @@ class Dataset:
     test: list[int]
     """Indices of the views that are held out."""
     points: _Float64
-    """COLMAP's points in world units, [P, 3]."""
+    """COLMAP's points in world units, float64 [P, 3]."""
     extent: float
-    """1.1 times the largest distance of a camera from the cameras' mean, in world units."""
+    """The scene's extent in world units: 1.1 times the largest distance of a camera from the
+    cameras' mean.
+    """
     offset: _Float64
-    """Offset that was subtracted from COLMAP's coordinates, in world units, [3]."""
+    """Offset that was subtracted from COLMAP's coordinates, in world units, float64 [3]; zero
+    unless these were large.
+    """
     options: dict[str, Any]
-    """Options of loading."""
+    """Options of loading, as a dictionary."""
 
     @staticmethod
     def open(
@@ -140,10 +145,11 @@ class Dataset:
         """
 
     def photo(self, view: int) -> _Uint8:
-        """The gray photo of a view, sRGB-encoded, [height, width]."""
+        """The gray photo of a view, uint8 [height, width], sRGB-encoded."""
 
     def mask(self, view: int) -> _Uint8 | None:
-        """The mask of a view, 255 where a pixel counts, [height, width]."""
+        """The mask of a view, uint8 [height, width]: 255 where a pixel counts; `None` where all do.
+        """
 
     def __len__(self) -> int: ...
 
@@ -158,21 +164,24 @@ class GsplatParameters(TypedDict):
     shN: _Float32
 
 class Splats:
-    """A set of N Gaussians. An array that is read is a copy."""
+    """A set of N Gaussians, as arrays of NumPy. An array that is read is a copy."""
 
     means: _Float32
-    """Centers in world units, [N, 3]."""
+    """Centers in world units, float32 [N, 3]."""
     log_scales: _Float32
-    """Natural logarithms of the standard deviations along the rotated axes, [N, 3]."""
+    """Natural logarithms of the standard deviations along the rotated axes, in world units, float32
+    [N, 3].
+    """
     quaternions: _Float32
-    """Rotations as quaternions w x y z of any length, [N, 4]."""
+    """Rotations as quaternions w x y z of any length, float32 [N, 4]."""
     opacity_logits: _Float32
-    """Logits of the opacities, [N]."""
+    """Logits of the opacities, float32 [N]."""
     sh: _Float32
-    """SH coefficients, [N, (degree + 1)², channels], ordered and signed as in 3D Gaussian
-    Splatting. 1 channel: gray, 3: RGB, both sRGB-encoded less 0.5. 2: CIELAB a and b."""
+    """SH coefficients, float32 [N, (degree + 1)², channels], in the order and with the signs of 3D
+    Gaussian Splatting: 1 channel gray, 3 RGB, sRGB-encoded less 0.5; 2 CIELAB a and b.
+    """
     offset: _Float64
-    """Offset that was subtracted from COLMAP's coordinates, in world units, [3]."""
+    """Offset that was subtracted from COLMAP's coordinates, in world units, float64 [3]."""
     antialiased: bool
     """True if opacities fall by what the screen blur spreads (Mip-Splatting)."""
 
@@ -189,24 +198,29 @@ class Splats:
     ) -> None: ...
     @staticmethod
     def read(path: _Path) -> Splats:
-        """Reads .ply, .compressed.ply, .splat, .spz or .sog."""
+        """Reads a splat file: .ply, .compressed.ply, .splat, .spz or .sog. What is doubtful about
+        it is a warning.
+        """
 
     def write(self, path: _Path) -> None:
-        """Writes .ply, .compressed.ply, .splat, .spz, .sog, .glb or .usda. Gray becomes RGB."""
+        """Writes a splat file, whose name tells the format: .ply, .compressed.ply, .splat, .spz,
+        .sog, .glb or .usda. Gray becomes RGB. What the format loses is a warning.
+        """
 
     @staticmethod
     def from_gsplat(
         params: Mapping[str, Any], *, offset: ArrayLike | None = None, antialiased: bool = False
     ) -> Splats:
-        """From gsplat's parameters: arrays or tensors means [N, 3], scales (logarithms) [N, 3],
-        quats (w x y z) [N, 4], opacities (logits) [N], sh0 [N, 1, 3], shN [N, 0, 3, 8 or 15, 3].
+        """From the parameters of gsplat: a dictionary of arrays or tensors `means` [N, 3], `scales`
+        (logarithms) [N, 3], `quats` (w x y z) [N, 4], `opacities` (logits) [N], `sh0` [N, 1, 3] and
+        `shN` [N, K, 3], K being 0, 3, 8 or 15.
         """
 
     def to_gsplat(self) -> GsplatParameters:
-        """gsplat's parameters, as `from_gsplat` takes them."""
+        """The parameters of gsplat, a dictionary of float32 arrays as `from_gsplat` takes it."""
 
     def to_luma(self) -> Splats:
-        """The same Gaussians in gray: the mean of their channels."""
+        """The same Gaussians in gray: one channel, the mean of all."""
 
     def __len__(self) -> int: ...
 
@@ -232,11 +246,13 @@ class LumaScene:
     dataset: Dataset
     """Photos that it was trained on."""
     settings: dict[str, Any]
-    """Settings of the training."""
+    """Settings of the training, as a dictionary."""
     effects: list[dict[str, Any]]
-    """Effects of image formation, with the evidence for them."""
+    """Effects of image formation with the evidence for them, a list of dictionaries."""
     curve: list[dict[str, float]]
-    """Scores of held-out views during training: iteration, seconds, splats, psnr in dB."""
+    """Scores of held-out views during training, a list of dictionaries: `iteration`, `seconds`,
+    `splats`, `psnr` in dB.
+    """
     iterations: int
     """Iterations that led to the Gaussians."""
 
@@ -289,17 +305,17 @@ class Colored:
     splats: Splats
     """The Gaussians with RGB harmonics, as splat files have them."""
     chroma: _Float32
-    """SH coefficients of CIELAB a and b, [N, (degree + 1)², 2], from which RGB is made."""
+    """SH coefficients of CIELAB a and b, float32 [N, (degree + 1)², 2], from which RGB is made."""
     dataset: Dataset
     """Photos that it was colored from."""
     settings: dict[str, Any]
-    """Settings of the solver."""
+    """Settings of the solver, as a dictionary."""
     saturation: float
-    """Factor that makes colors as strong as the teacher's; in `splats` and `chroma`."""
+    """Factor that makes colors as strong as the teacher's; it is in `splats` and `chroma`."""
 
     def photo(self, view: int) -> _Uint8:
-        """The photo of a view in the scene's colors, at its own lightness: sRGB
-        [height, width, 3]. What the scene does not show stays gray.
+        """The photo of a view in the scene's colors, at its own lightness: uint8 [height, width,
+        3], sRGB. What the scene does not show stays gray.
         """
 
 def colorize(
@@ -326,14 +342,14 @@ def render(
     scene: LumaScene | Colored | Splats, camera: Camera, *, near: float | None = None
 ) -> _Float32:
     """A picture of a scene: gray [height, width], RGB [height, width, 3], both sRGB in 0 to 1, or
-    CIELAB a and b [height, width, 2].
+    CIELAB a and b [height, width, 2]; float32.
 
     Nothing nearer than `near`, in world units, is shown; by default a hundredth of the extent.
     """
 
 def device() -> str:
     """Name and driver of the device that jobs run on: the fastest one, or the one that the
-    environment variable WGPU_ADAPTER_NAME names when the first job begins.
+    environment variable `WGPU_ADAPTER_NAME` named when the first job began.
     """
 
 def evaluate(

@@ -14,7 +14,7 @@ def declare() -> None:
     """Tells the compiled part what it would find out by itself as a program of its own."""
     for name in _native.variables():
         os.environ.setdefault(name, "1")
-    command = [sys.executable, str(Path(__file__).with_name("__main__.py"))]
+    command = [sys.executable or "python3", str(Path(__file__).with_name("__main__.py"))]
     _native.declare(command, sys.argv[1:], libraries())
 
 

@@ -4,7 +4,7 @@ use std::{ffi::CString, ops::ControlFlow};
 
 use pyo3::{exceptions::PyUserWarning, prelude::*};
 
-/// Progress of a job.
+/// Progress of a job; `str()` of it is a line.
 #[pyclass(frozen, module = "gs_chroma", get_all)]
 #[derive(Clone, Default)]
 pub struct Progress {

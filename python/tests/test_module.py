@@ -306,7 +306,8 @@ class Program(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             fit = [*PROGRAM, "fit", str(DEMO), "-o", "run", "--iterations", "100000"]
             child = subprocess.Popen(fit, cwd=folder, stderr=subprocess.PIPE, text=True)
-            time.sleep(2)
+            while not Path(folder, "run").exists() and child.poll() is None:
+                time.sleep(0.05)
             for _ in range(2):
                 child.send_signal(signal.SIGINT)
                 time.sleep(0.2)
