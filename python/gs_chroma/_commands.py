@@ -12,9 +12,10 @@ Report = Callable[[_native.Progress], object]
 
 
 def evaluate(run: Any = None, *, progress: Report | None = None, **options: Any) -> dict[str, Any]:
-    """Measures a colored run, and gives what `eval.json` holds.
+    """Measures a colored run, and gives what eval.json holds (docs/run-folder.md).
 
-    `options` are those of `gs-chroma eval`, with `_` for `-`.
+    `options` are those of `gs-chroma eval`, with `_` for `-`: `teacher="ddcolor-tiny",
+    baselines=True`. The run is by default the newest below runs/.
     """
     return _answer("eval", run, progress, options)
 
@@ -32,7 +33,7 @@ def export(
 def frames(
     run: Any = None, output: Any = None, *, progress: Report | None = None, **options: Any
 ) -> dict[str, Any]:
-    """Writes the photos of a colored run in color, and gives what was done.
+    """Writes the photos of a colored run in color, as pictures or a film.
 
     `options` are those of `gs-chroma frames`, with `_` for `-`.
     """

@@ -201,7 +201,7 @@ fn subject(
         let drawn = scene.settings.raster_options();
         return Ok((
             own.clone(),
-            scene.splats.clone(),
+            as_in_files(scene.splats.clone()),
             drawn,
             scene.settings.seed,
         ));
@@ -224,6 +224,18 @@ fn subject(
     };
     let luma = splats.seen_by(&dataset.0.capture).to_luma();
     Ok((dataset.0.clone(), luma, drawn, 0))
+}
+
+/// Gaussians with unit quaternions, so that a trained scene gets the same colors as from its file.
+fn as_in_files(mut splats: splats::Splats) -> splats::Splats {
+    for quaternion in &mut splats.quats {
+        let wide = quaternion.map(f64::from);
+        let norm = wide.iter().map(|value| value * value).sum::<f64>().sqrt();
+        if norm > 0.0 {
+            *quaternion = wide.map(|value| (value / norm) as f32);
+        }
+    }
+    splats
 }
 
 /// Settings of the solver with those in keywords in their place.
@@ -298,6 +310,6 @@ impl Job {
 fn solving(name: &str, progress: ChromaProgress) -> Progress {
     Progress {
         loss: Some(progress.loss),
-        ..stage(name, progress.iteration, progress.total, "")
+        ..Progress::of(name, progress.iteration, progress.total, "")
     }
 }

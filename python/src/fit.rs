@@ -213,7 +213,7 @@ impl Job {
             LumaEvent::Training(done) => reporter.tell(Progress {
                 loss: Some(done.loss),
                 gaussians: Some(done.splats),
-                ..stage("training", done.iteration, done.end, "")
+                ..Progress::of("training", done.iteration, done.end, "")
             }),
             LumaEvent::Plan(_) => std::ops::ControlFlow::Continue(()),
         })

@@ -6,7 +6,7 @@ use pyo3::{exceptions::PyUserWarning, prelude::*};
 
 /// Progress of a job; `str()` of it is a line.
 #[pyclass(frozen, module = "gs_chroma", get_all)]
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub struct Progress {
     /// Stage of the job.
     pub stage: String,

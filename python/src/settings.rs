@@ -23,18 +23,25 @@ pub fn overlaid<T: Serialize + DeserializeOwned>(
     let known: Vec<String> = settings.keys().cloned().collect();
     if let Some(keywords) = keywords {
         for (name, value) in of_python::<Map<String, Value>>(keywords)? {
-            let before = settings.insert(name.clone(), value.clone());
-            let read: T =
-                serde_json::from_value(Value::Object(settings.clone())).map_err(|error| {
-                    let before = before.unwrap_or_default();
-                    PyValueError::new_err(format!("{name}: {error} [default: {before}]"))
-                })?;
-            // Some are left out of JSON while they are null.
-            let taken = serde_json::to_value(&read).map_err(unreadable)?;
-            if taken.get(&name).is_none() && !value.is_null() {
+            let before = settings.insert(name.clone(), value);
+            let read = serde_json::from_value::<T>(Value::Object(settings.clone()));
+            // Of those that JSON leaves out while they are null there is no default.
+            let taken = match (&read, &before) {
+                (Ok(read), None) => serde_json::to_value(read)
+                    .map_err(unreadable)?
+                    .get(&name)
+                    .is_some(),
+                (_, before) => before.is_some(),
+            };
+            if !taken {
                 let known = known.join(", ");
                 let reason = format!("there is no setting {name}; there are {known}");
                 return Err(PyTypeError::new_err(reason));
+            }
+            if let Err(error) = read {
+                let before = before.unwrap_or_default();
+                let reason = format!("{name}: {error} [default: {before}]");
+                return Err(PyValueError::new_err(reason));
             }
         }
     }

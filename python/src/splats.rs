@@ -20,7 +20,7 @@ use crate::{
 const SURE: f32 = 80.0;
 
 /// A set of N Gaussians, as arrays of NumPy. An array that is read is a copy.
-#[pyclass(frozen, module = "gs_chroma")]
+#[pyclass(frozen, module = "gs_chroma", skip_from_py_object)]
 #[derive(Clone)]
 pub struct Splats {
     /// The Gaussians.
