@@ -23,7 +23,9 @@ def main() -> int:
     if sys.version_info < PYTHON or not importlib.util.find_spec("numpy"):
         print(f"Python tests are skipped: {sys.executable} is older than 3.10 or lacks NumPy")
         return 0
-    cargo = ["cargo", "build", "--package", "gs-chroma-python"]
+    # An example, so that dependencies have the features of tests and are built already.
+    cargo = ["cargo", "build", "--package", "gs-chroma", "--package", "gs-chroma-python"]
+    cargo += ["--lib", "--example", "color_scene"]
     status = subprocess.run(cargo, cwd=ROOT, check=False).returncode
     if status != 0:
         return status
