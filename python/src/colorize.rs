@@ -226,7 +226,8 @@ fn subject(
     Ok((dataset.0.clone(), luma, drawn, 0))
 }
 
-/// Gaussians with unit quaternions, so that a trained scene gets the same colors as from its file.
+/// Gaussians as they are read from a file, of unit quaternions and three channels: a trained scene
+/// gets the same colors as from its file.
 fn as_in_files(mut splats: splats::Splats) -> splats::Splats {
     for quaternion in &mut splats.quats {
         let wide = quaternion.map(f64::from);
@@ -235,7 +236,8 @@ fn as_in_files(mut splats: splats::Splats) -> splats::Splats {
             *quaternion = wide.map(|value| (value / norm) as f32);
         }
     }
-    splats
+    splats.sh = splats.sh.to_rgb();
+    splats.to_luma()
 }
 
 /// Settings of the solver with those in keywords in their place.

@@ -59,7 +59,7 @@ class Stub(unittest.TestCase):
                 found = getattr(thing, member) if isinstance(found, staticmethod) else found
                 self.compare(f"{name}.{member}", inner, text, found)
                 count += 1
-        self.assertGreater(count, 60)
+        self.assertGreater(count, 50)
 
     def test_all_names_are_in_the_stub(self) -> None:
         names = {name for name, _, _ in documented(ast.parse(STUB.read_text(encoding="utf-8")).body)}
