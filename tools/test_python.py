@@ -20,8 +20,10 @@ LIBRARY = {"win32": "gs_chroma_python.dll", "darwin": "libgs_chroma_python.dylib
 
 def main() -> int:
     """The exit status of the tests, or 0 where this Python cannot run them."""
-    if sys.version_info < PYTHON or not importlib.util.find_spec("numpy"):
-        print(f"Python tests are skipped: {sys.executable} is older than 3.10 or lacks NumPy")
+    old = sys.version_info < PYTHON
+    if old or not importlib.util.find_spec("numpy"):
+        reason = "is older than 3.10" if old else "lacks NumPy"
+        print(f"Python tests are skipped: {sys.executable} {reason}")
         return 0
     # An example, so that dependencies have the features of tests and are built already.
     cargo = ["cargo", "build", "--package", "gs-chroma", "--package", "gs-chroma-python"]
