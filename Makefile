@@ -34,6 +34,7 @@ test test-all: export MESA_SHADER_CACHE_DIR := $(CURDIR)/target/mesa
 test test-all: export RUST_TEST_THREADS := $(TEST_THREADS)
 test: setup lint
 	cargo test
+	@python3 tools/test_python.py
 
 # A missing program fails a test here. `PYTHON` has OpenUSD.
 test-all: export PYTHON := $(CURDIR)/target/test-all/bin/python
@@ -41,11 +42,13 @@ test-all: export PATH := $(CURDIR)/target/test-all/bin:$(PATH)
 test-all: setup-all lint
 	cargo clippy --lib --test fuzz --no-default-features -- -D warnings
 	cargo test --workspace -- --include-ignored
+	cargo clippy --package gs-chroma-python -- -D warnings
+	$(PYTHON) tools/test_python.py
 	$(if $(filter-out 0,$(shell id -u)),sudo -n --preserve-env=HOME) tools/bare_machine.sh
 
 lint:
 	@cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 || rustup component add rustfmt clippy
-	cargo fmt --check
+	cargo fmt --all --check
 	cargo clippy --all-targets -- -D warnings
 	@$(MAKE) --no-print-directory prose
 

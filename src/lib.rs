@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! cli → auto → tradeoff, view → run, prepare → subject → store → tell → eval, frames, viewers, blocks → report, doctor → luma, chroma → effects, measure, trajectory → raster
-//! → capture, splats → gpu, color, sections, download, npy, programs, archive, oracle, compare → disk, hash, input
+//! → capture, splats → gpu, color, sections, download, npy, programs, archive, oracle, compare → disk, hash, input, invocation
 //! ```
 //!
 //! `doctor` compares the kernels of [`raster`], [`luma`] and [`chroma`] with the `oracle`, which
@@ -76,6 +76,7 @@ mod frames;
 pub mod gpu;
 mod hash;
 mod input;
+mod invocation;
 pub mod luma;
 pub mod measure;
 mod npy;
@@ -109,8 +110,13 @@ mod viewers;
 /// Kernels, oracle, doctor and the program's own floors, for its tests, benchmarks and tools; no
 /// promises between versions.
 pub mod low_level {
+    pub use crate::invocation::{Invocation, variables};
     #[cfg(feature = "cli")]
-    pub use crate::{cli::Cli, store::RunFolder};
+    pub use crate::{
+        cli::{AnswerError, Cli, CliError, answer},
+        store::RunFolder,
+        tell::Event,
+    };
 
     /// Comparators.
     pub mod compare {

@@ -120,7 +120,7 @@ def install_tools_of_all_tests() -> None:
     python = folder / "bin" / "python"
     if not python.exists() and not run([sys.executable, "-m", "venv", str(folder)]):
         say("there is no OpenUSD: venv failed")
-    elif not run([str(python), "-m", "pip", "--quiet", "install", "usd-core==26.11"]):
+    elif not run([str(python), "-m", "pip", "--quiet", "install", "usd-core==26.11", "numpy"]):
         say(f"there is no OpenUSD: pip failed in {folder}")
     if not shutil.which("naga") and not (folder / "bin" / "naga").exists():
         cargo = ["cargo", "install", "--quiet", "--locked", "naga-cli@30.0.1", "--root", str(folder)]

@@ -92,8 +92,9 @@ pub struct Eval {
 }
 
 impl Eval {
-    pub(super) fn run(self) -> Result<(), CliError> {
-        let options = EvalOptions {
+    /// The request.
+    pub(super) fn options(self) -> EvalOptions {
+        EvalOptions {
             run: self.run,
             teacher: self.teacher,
             teacher_settings: self.network.settings(),
@@ -107,11 +108,16 @@ impl Eval {
             detector: self.detector,
             against: self.against,
             gray_frames: self.gray_frames,
-        };
+        }
+    }
+
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let json = self.json;
+        let options = self.options();
         let mut progress = Progress::through(options.stages());
         let (folder, evaluation) = eval(&options, &mut |event| progress.show(&event))?;
         progress.finish();
-        if self.json {
+        if json {
             return print(evaluation.to_json());
         }
         print(evaluation.verdict().join("\n") + "\n")?;

@@ -64,11 +64,9 @@ pub struct Export {
 }
 
 impl Export {
-    pub(super) fn run(self) -> Result<(), CliError> {
-        if is_html(&self.output) {
-            return self.run_html();
-        }
-        let options = ExportOptions {
+    /// The request of a splat file.
+    pub(super) fn options(self) -> ExportOptions {
+        ExportOptions {
             run: self.run,
             output: self.output,
             luma: self.luma,
@@ -77,11 +75,19 @@ impl Export {
             viewer: self.viewer,
             antialiased: self.antialiased,
             colmap: self.colmap,
-        };
+        }
+    }
+
+    pub(super) fn run(self) -> Result<(), CliError> {
+        if is_html(&self.output) {
+            return self.run_html();
+        }
+        let json = self.json;
+        let options = self.options();
         let mut progress = Progress::through(options.stages());
         let wrote = export(&options, &mut |event| progress.show(&event))?;
         progress.finish();
-        if self.json {
+        if json {
             return print(format_args!("{:#}", serde_json::json!(wrote)));
         }
         print(format_args!(

@@ -74,8 +74,9 @@ pub struct FramesCommand {
 }
 
 impl FramesCommand {
-    pub(super) fn run(self) -> Result<(), CliError> {
-        let options = FramesOptions {
+    /// The request.
+    pub(super) fn options(self) -> FramesOptions {
+        FramesOptions {
             run: self.run,
             colmap: self.colmap,
             teacher: self.teacher,
@@ -85,11 +86,16 @@ impl FramesCommand {
             teacher_alone: self.teacher_alone,
             codec: self.codec,
             frame_rate: self.frame_rate.map(|Rate(rate)| rate),
-        };
+        }
+    }
+
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let json = self.json;
+        let options = self.options();
         let mut progress = Progress::through(options.stages());
         let done = frames(&options, &mut |event| progress.show(&event))?;
         progress.finish();
-        if self.json {
+        if json {
             let text = serde_json::to_string_pretty(&done);
             return print(text.unwrap_or_default());
         }

@@ -1,5 +1,6 @@
 //! The commands: arguments in, text out. What they do is in [`crate::run`].
 
+mod answer;
 mod auto;
 mod bar;
 mod checkpoint;
@@ -36,12 +37,15 @@ mod usage;
 mod values;
 mod view;
 
-use std::process::ExitCode;
+use std::iter;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
+pub use answer::{AnswerError, answer};
 pub use error::CliError;
 use printable::{print, print_as_is};
+
+use crate::invocation::Invocation;
 
 /// Turns grayscale photos or films into a colored 3D Gaussian splat scene.
 #[derive(Parser)]
@@ -83,14 +87,21 @@ enum Command {
 }
 
 impl Cli {
-    /// Runs the command; what stops it is told in one line on standard error.
-    pub fn main(self) -> ExitCode {
+    /// The command in the program's arguments; ends the process where they are wrong.
+    pub fn of_arguments() -> Self {
+        let arguments = Invocation::present().arguments.iter().cloned();
+        Self::parse_from(iter::once("gs-chroma".into()).chain(arguments))
+    }
+
+    /// Runs the command and gives the exit status; what stops it is told in one line on standard
+    /// error.
+    pub fn main(self) -> u8 {
         crate::tradeoff::end_with_parent();
         match interrupt::heed_signals().and_then(|()| self.run()) {
-            Ok(()) => ExitCode::SUCCESS,
+            Ok(()) => 0,
             Err(error) => {
                 eprintln!("error: {}", printable::line(&error.to_string()));
-                ExitCode::FAILURE
+                1
             }
         }
     }

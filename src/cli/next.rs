@@ -1,12 +1,12 @@
 //! Suggestions of the next command.
 
-use std::{env, path::Path};
+use std::path::Path;
 
-use crate::tradeoff::shell_line as line;
+use crate::{invocation::Invocation, tradeoff::shell_line as line};
 
 /// `fit` with the options that `plan` was given.
 pub(super) fn fit_as_planned() -> String {
-    let given = env::args_os().skip(2);
+    let given = Invocation::present().arguments.iter().skip(1);
     let given = given.map(|word| word.to_string_lossy().into_owned());
     line(
         &["fit".to_owned()]

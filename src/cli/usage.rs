@@ -1,18 +1,17 @@
 //! Commands that were called wrongly: exit status 2, with the usage of the command in question.
 
-use std::env;
-
 use clap::{Command, CommandFactory, error::ErrorKind};
 
 use super::Cli;
+use crate::invocation::Invocation;
 
 /// The command that was called, as the program's first argument names it.
 pub(super) fn called() -> Command {
     let mut program = Cli::command();
     // Subcommands learn the program's name.
     program.build();
-    let name = env::args().nth(1).unwrap_or_default();
-    match program.find_subcommand(&name) {
+    let name = Invocation::present().arguments.first();
+    match name.and_then(|name| program.find_subcommand(name)) {
         Some(command) => command.clone(),
         None => program,
     }

@@ -17,6 +17,7 @@ pub enum Event {
     Warning(String),
     /// Progress of a stage; the first of another stage ends the one before.
     Progress {
+        /// Stage of the command.
         stage: Stage,
         /// Steps done.
         done: usize,

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::{disk, input};
+use crate::{disk, input, invocation::Invocation};
 
 /// Set for a program that is to end when its standard input does.
 const TETHER: &str = "GS_CHROMA_ENDS_WITH_STDIN";
@@ -54,7 +54,11 @@ pub(super) fn run(arguments: &[String], log: &Path, tell: &mut dyn FnMut()) -> R
 fn ended(arguments: &[String], log: &Path, tell: &mut dyn FnMut()) -> io::Result<ExitStatus> {
     let stderr = disk::open_in_place(log)?;
     stderr.set_len(0)?;
-    let mut child = Command::new(env::current_exe()?)
+    let [program, words @ ..] = &*Invocation::present().command else {
+        return Err(io::ErrorKind::NotFound.into());
+    };
+    let mut child = Command::new(program)
+        .args(words)
         .args(arguments)
         .env(TETHER, "1")
         // A fault of a test is this program's own.

@@ -4,6 +4,7 @@
 use super::TeacherError;
 use super::error::first_line;
 use super::places::cache_folder;
+use crate::invocation::Invocation;
 use ort::environment::Environment;
 use std::env;
 use std::error::Error;
@@ -30,7 +31,7 @@ static ENVIRONMENT: Mutex<Option<Environment>> = Mutex::new(None);
 /// The environment of ONNX Runtime.
 ///
 /// The library is looked for where `ORT_DYLIB_PATH` says (and then nowhere
-/// else), beside the program, in the project's cache folder, and on the
+/// else), beside the program or in Python's package, in the project's cache folder, and on the
 /// system's library path.
 pub(crate) fn environment() -> Result<Environment, TeacherError> {
     // A panic elsewhere leaves a whole environment or none.
@@ -38,16 +39,10 @@ pub(crate) fn environment() -> Result<Environment, TeacherError> {
     if let Some(environment) = environment.as_ref() {
         return Ok(environment.clone());
     }
-    let program = env::current_exe().ok();
-    let folders = [
-        program
-            .as_deref()
-            .and_then(Path::parent)
-            .map(Path::to_path_buf),
-        cache_folder(FOLDER),
-    ];
+    let folders = Invocation::present().libraries.iter().cloned();
+    let folders = folders.chain(cache_folder(FOLDER));
     let named = env::var_os(LIBRARY_VARIABLE).filter(|path| !path.is_empty());
-    let built = match find(named.map(PathBuf::from), folders.into_iter().flatten()) {
+    let built = match find(named.map(PathBuf::from), folders) {
         Some(path) => load(&path)?,
         None => system_names()
             .iter()

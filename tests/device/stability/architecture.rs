@@ -21,7 +21,7 @@ const FLOORS: [&[&str]; 15] = [
     &[
         "gpu", "color", "sections", "download", "npy", "programs", "archive", "oracle", "compare",
     ],
-    &["disk", "hash", "input"],
+    &["disk", "hash", "input", "invocation"],
 ];
 
 fn floor(name: &str) -> Option<usize> {
