@@ -41,6 +41,7 @@ test-all: export PATH := $(CURDIR)/target/test-all/bin:$(PATH)
 test-all: setup-all lint
 	cargo clippy --lib --test fuzz --no-default-features -- -D warnings
 	cargo test --workspace -- --include-ignored
+	tools/check_package.sh
 	$(if $(filter-out 0,$(shell id -u)),sudo -n --preserve-env=HOME) tools/bare_machine.sh
 
 lint:

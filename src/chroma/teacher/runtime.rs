@@ -45,6 +45,8 @@ pub(crate) fn environment() -> Result<Environment, TeacherError> {
             .and_then(Path::parent)
             .map(Path::to_path_buf),
         cache_folder(FOLDER),
+        // Where pip puts the Python package.
+        cache_folder(FOLDER).map(|folder| folder.join("onnxruntime/capi")),
     ];
     let named = env::var_os(LIBRARY_VARIABLE).filter(|path| !path.is_empty());
     let built = match find(named.map(PathBuf::from), folders.into_iter().flatten()) {
