@@ -250,48 +250,45 @@ impl Frame {
         wrong(&self.file, format!("frames[{}].{reason}", self.index))
     }
 
-    fn number(&self, name: &str) -> Result<Option<f64>, CaptureError> {
-        let value = self.fields.get(name).filter(|value| !value.is_null());
-        let number = value.map(|value| value.as_f64().ok_or(()));
-        number
-            .transpose()
-            .map_err(|()| self.wrong(format!("{name} is no number")))
+    /// Numbers of these names, where they are there.
+    fn numbers<const N: usize>(&self, names: [&str; N]) -> Result<[Option<f64>; N], CaptureError> {
+        let mut numbers = [None; N];
+        for (number, name) in numbers.iter_mut().zip(names) {
+            let value = self.fields.get(name).filter(|value| !value.is_null());
+            *number = value.map(|value| value.as_f64().unwrap_or(f64::NAN));
+            if number.is_some_and(f64::is_nan) {
+                return Err(self.wrong(format!("{name} is no number")));
+            }
+        }
+        Ok(numbers)
     }
 
     /// Camera model, width, height and parameters, as COLMAP has them.
     fn lens(&self) -> Result<(ModelName, [u32; 2], Vec<f64>), CaptureError> {
-        let size = match (self.number("w")?, self.number("h")?) {
-            (Some(w), Some(h)) => [w, h].map(|side| side.round() as u32),
+        let size = match self.numbers(["w", "h"])? {
+            [Some(w), Some(h)] => [w, h].map(|side| side.round() as u32),
             _ => decode::header(&self.path)?.size,
         };
         let [width, height] = size.map(f64::from);
-        let focal = |name, angle, side: f64| {
-            let by_angle = self
-                .number(angle)?
-                .map(|angle| 0.5 * side / (0.5 * angle).tan());
-            Ok::<_, CaptureError>(self.number(name)?.or(by_angle))
-        };
-        let fy = focal("fl_y", "camera_angle_y", height)?;
-        let fx = focal("fl_x", "camera_angle_x", width)?.or(fy);
-        let mut of = [0.0; 8];
-        for (value, name) in of
-            .iter_mut()
-            .zip(["k1", "k2", "k3", "k4", "p1", "p2", "k5", "k6"])
-        {
-            *value = self.number(name)?.unwrap_or_default();
-        }
-        let [k1, k2, k3, k4, p1, p2, k5, k6] = of;
+        let [fl_x, fl_y, cx, cy] = self.numbers(["fl_x", "fl_y", "cx", "cy"])?;
+        let angles = self.numbers(["camera_angle_x", "camera_angle_y"])?;
+        let focal = |side: f64, angle: f64| 0.5 * side / (0.5 * angle).tan();
+        let fl_y = fl_y.or(angles[1].map(|angle| focal(height, angle)));
+        let fl_x = fl_x.or(angles[0].map(|angle| focal(width, angle)));
+        let [k1, k2, k3, p1, p2, k4, k5, k6] = self
+            .numbers(["k1", "k2", "k3", "p1", "p2", "k4", "k5", "k6"])?
+            .map(Option::unwrap_or_default);
         let fisheye = self.fields.get("is_fisheye") == Some(&Value::Bool(true));
         let usual = if fisheye { "OPENCV_FISHEYE" } else { "OPENCV" };
         let named = self
             .fields
             .get("camera_model")
             .map_or(usual, |v| v.as_str().unwrap_or("?"));
-        let (model, coefficients) = match (named, of) {
-            ("EQUIRECTANGULAR", _) => (named, vec![]),
-            ("OPENCV_FISHEYE", _) if [p1, p2] == [0.0; 2] => (named, vec![k1, k2, k3, k4]),
+        let (model, coefficients) = match named {
+            "EQUIRECTANGULAR" => (named, vec![]),
+            "OPENCV_FISHEYE" if [p1, p2] == [0.0; 2] => (named, vec![k1, k2, k3, k4]),
             // What k4 means differs from program to program.
-            ("OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL", _)
+            "OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL"
                 if [k4, k5, k6] == [0.0; 3] =>
             {
                 match (k3 == 0.0, [k1, k2, p1, p2] == [0.0; 4]) {
@@ -309,12 +306,10 @@ impl Frame {
         if model == "EQUIRECTANGULAR" {
             return Ok((known, size, vec![width, height]));
         }
+        let fx = fl_x.or(fl_y);
         let fx = fx.ok_or_else(|| self.wrong("fl_x and camera_angle_x are missing"))?;
-        let center = [
-            self.number("cx")?.unwrap_or(width / 2.0),
-            self.number("cy")?.unwrap_or(height / 2.0),
-        ];
-        let pinhole = [fx, fy.unwrap_or(fx), center[0], center[1]];
+        let center = [cx.unwrap_or(width / 2.0), cy.unwrap_or(height / 2.0)];
+        let pinhole = [fx, fl_y.unwrap_or(fx), center[0], center[1]];
         Ok((known, size, [&pinhole[..], &coefficients].concat()))
     }
 }

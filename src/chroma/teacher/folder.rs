@@ -243,6 +243,8 @@ mod tests {
         };
         let mut capture = Capture {
             root: folder.path().into(),
+            photos: folder.path().join("images"),
+            split: None,
             views: vec![view("shot0.jpg"), view("shot0.png")],
             points: Vec::new(),
             offset: glam::DVec3::ZERO,
