@@ -83,7 +83,9 @@ pub fn photo_folder(dir: &Path) -> PathBuf {
 pub fn originals(dir: &Path) -> Vec<PathBuf> {
     let mut all = vec![colmap_photos(dir), dir.join("sparse"), dir.join("colmap")];
     all.extend(transforms::files(dir));
-    if let (true, Ok(scene)) = (lists_photos(dir), Scene::read(dir)) {
+    if lists_photos(dir)
+        && let Ok(scene) = Scene::read(dir)
+    {
         all.extend(scene.points.map(|(path, _)| path));
         all.extend(scene.frames.into_iter().map(|frame| frame.path));
     }

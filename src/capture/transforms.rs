@@ -186,7 +186,7 @@ pub(super) fn read(root: &Path, chosen: Option<&Chosen>) -> Result<Source, Captu
 }
 
 impl Scene {
-    /// Reads the [`files`] of a folder that has some.
+    /// Reads the [`files`] of a folder.
     pub fn read(root: &Path) -> Result<Self, CaptureError> {
         let (mut frames, mut points) = (Vec::new(), None);
         for (place, file) in files(root).into_iter().enumerate() {
@@ -221,7 +221,8 @@ impl Scene {
             }
         }
         let Some(first) = frames.first() else {
-            let file = files(root).swap_remove(0);
+            let file = files(root).into_iter().next();
+            let file = file.unwrap_or_else(|| root.join(FILES[0]));
             return Err(wrong(&file, "lists no frames".to_owned()));
         };
         let folder = first.name.split_once('/').map_or("", |(folder, _)| folder);

@@ -77,7 +77,7 @@ pub struct Colorize {
     /// {in} is a gray PNG of 8 bits, {out} where to write the colored picture, of any size. For
     /// {in_dir} and {out_dir} it starts once, and names its pictures like those it is given. Words
     /// are split as a shell does, but no shell runs: variables and pipes mean nothing.
-    #[arg(long, value_name = "COMMAND", value_parser = command, help_heading = TEACHER)]
+    #[arg(long, value_name = "COMMAND", value_parser = command, help_heading = TEACHER, hide_short_help = true)]
     teacher_command: Option<String>,
     /// Weight of each --teacher, in the order given [default: equal].
     #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = positive::<f32>, requires = "teacher", help_heading = TEACHER)]
