@@ -44,6 +44,7 @@ test-all: setup-all lint
 	cargo test --workspace -- --include-ignored
 	cargo clippy --package gs-chroma-python -- -D warnings
 	$(PYTHON) tools/test_python.py
+	tools/check_package.sh
 	$(if $(filter-out 0,$(shell id -u)),sudo -n --preserve-env=HOME) tools/bare_machine.sh
 
 lint:

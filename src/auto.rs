@@ -16,8 +16,9 @@ use std::{
 use serde_json::json;
 
 use crate::{
-    capture::{Film, IMAGES},
+    capture::{Film, is_capture, originals},
     chroma::teacher::{Teacher, TeacherSettings},
+    gpu::Gpu,
     prepare::{CameraMotion, PrepareError, PrepareOptions, digest, digest_of, prepare},
     run::{
         ColorizeRequest, EvalOptions, ExportOptions, FitRequest, FramesOptions, Preset, RunError,
@@ -200,9 +201,11 @@ fn make_scene(
     hints: &str,
     steps: &mut Steps<'_, '_>,
 ) -> Result<(), AutoError> {
+    let mut capture = originals(house);
+    capture.retain(|path| path.exists());
+    let capture: Result<Vec<_>, _> = capture.iter().map(|path| digest(path)).collect();
     let from = digest_of(&[
-        &digest(&house.join("sparse"))?,
-        &digest(&house.join(IMAGES))?,
+        &capture?.concat(),
         &masks(house)?,
         &json!(options.preset).to_string(),
     ]);
@@ -324,8 +327,9 @@ fn make_results(
     Ok(results)
 }
 
-/// Opens the teacher and the places of results: better now than after hours of work.
+/// Opens device, teacher and the places of results: better now than after hours of work.
 fn check(options: &AutoOptions) -> Result<(), AutoError> {
+    Gpu::open().map_err(RunError::from)?;
     // Photos are asked for once they are there.
     if options.teacher.as_os_str() != "photos" {
         let opened = Teacher::open(&options.teacher, None, &options.teacher_settings);
@@ -368,7 +372,7 @@ fn prepared(
     tell: &mut Teller<'_>,
 ) -> Result<(PathBuf, Option<CameraMotion>), AutoError> {
     let input = &options.prepare.input;
-    if input.join(IMAGES).is_dir() && input.join("sparse").is_dir() {
+    if is_capture(input) {
         tell(AutoEvent::Skips(Step::Prepare));
         return Ok((input.clone(), None));
     }

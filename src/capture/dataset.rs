@@ -109,9 +109,10 @@ impl Dataset {
             cameras.push(camera);
         }
         Ok(Self {
-            split: match &options.chosen {
-                Some(chosen) => split_as(&capture.views, chosen),
-                None => split(&capture.views, options.holdout),
+            split: match (&options.chosen, &capture.split) {
+                (Some(chosen), _) => split_as(&capture.views, chosen),
+                (None, Some(listed)) if options.holdout => split_as(&capture.views, listed),
+                (None, _) => split(&capture.views, options.holdout),
             },
             options: loader.options().clone(),
             cameras,

@@ -28,24 +28,48 @@ impl fmt::Display for Position {
 #[derive(Debug, Error)]
 pub enum CaptureError {
     /// The given path is no folder.
-    #[error("{dir}: no such folder; give the COLMAP folder that holds images/ and sparse/")]
+    #[error(
+        "{dir}: no such folder; give the COLMAP folder that holds images/ and sparse/, or one with transforms.json"
+    )]
     NoFolder {
         /// The path that was given.
         dir: PathBuf,
     },
     /// The folder holds no `images/`.
-    #[error("{dir}: holds no images/ folder; put the photos that COLMAP saw there")]
+    #[error(
+        "{dir}: holds no images/ folder and no transforms.json; put the photos that COLMAP saw there"
+    )]
     NoImagesFolder {
         /// The folder that was given.
         dir: PathBuf,
     },
     /// The folder holds no COLMAP model.
     #[error(
-        "{dir}: holds no COLMAP model; put cameras, images and points3D (.bin or .txt) into its sparse/0/"
+        "{dir}: holds no COLMAP model; put cameras, images and points3D (.bin or .txt) into its sparse/0/, or nerfstudio's transforms.json beside images/"
     )]
     NoModel {
         /// The folder that was given.
         dir: PathBuf,
+    },
+    /// The folder holds another program's files.
+    #[error(
+        "{path}: is of {program}, whose files are not read; export COLMAP's model there ({export}), and the photos to images/"
+    )]
+    OtherProgram {
+        /// A file of the program.
+        path: PathBuf,
+        /// Its name.
+        program: &'static str,
+        /// Menu of the export.
+        export: &'static str,
+    },
+    /// A `transforms.json` or its point cloud is invalid.
+    #[error("{path}: {reason}")]
+    Transforms {
+        /// File at fault.
+        path: PathBuf,
+        /// The error, with the field.
+        reason: String,
     },
     /// Some of a model's three files are there and some are not.
     #[error(
@@ -171,7 +195,7 @@ pub enum CaptureError {
     },
     /// Photos that the model names are not there.
     #[error(
-        "{first}: no such photo, and {missing} of {total} are missing; copy them into images/ under the names COLMAP knew"
+        "{first}: no such photo, and {missing} of {total} are missing; copy them there under these names"
     )]
     MissingPhotos {
         /// The first missing photo by name.

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use super::decode::{self, DecodedImage};
 use super::error::CaptureError;
-use super::names::{self, NamedFiles, composed, is_one_of, photos_in, visit_files};
+use super::names::{self, NamedFiles, composed, is_one_of, visit_files};
 use super::options::MaskSource;
 use super::orientation::{Orientation, SensorOrientation};
 use super::photo::same_shape;
 use super::resample::downscale;
 use super::sample::{Depth, Header, Samples};
-use super::{Capture, IMAGES, View, first_views};
+use super::{Capture, View, first_views};
 
 /// Default folder of masks, beside `images/`.
 const BESIDE: &str = "masks";
@@ -48,7 +48,6 @@ impl MaskFolder {
         source: &MaskSource,
         partial: bool,
     ) -> Result<Option<Self>, CaptureError> {
-        let images = capture.root.join(IMAGES);
         let masks = match source {
             MaskSource::Off | MaskSource::Alpha => return Ok(None),
             MaskSource::ImageMetadata => capture.root.join(BESIDE),
@@ -79,7 +78,7 @@ impl MaskFolder {
         if masked == 0 && partial {
             return Ok(None);
         }
-        if same_folder(&masks, &images) || masked == 0 {
+        if same_folder(&masks, &capture.photos) || masked == 0 {
             return Err(CaptureError::NoMasks {
                 dir: masks,
                 example: with_png(Path::new(&capture.views[0].photo)),
@@ -87,7 +86,7 @@ impl MaskFolder {
         }
         // Photos without a pose may have masks as well.
         let mut all = files.clone();
-        let placed_or_not = photos_in(&images);
+        let placed_or_not = capture.all_photos();
         all.know(placed_or_not.iter().map(String::as_str));
         others.extend(all.strays().into_iter().map(str::to_owned));
         others.sort();

@@ -9,6 +9,7 @@ mod decode;
 mod error;
 mod exposure;
 mod film;
+mod guess;
 mod in_order;
 mod jpeg;
 mod layers;
@@ -25,11 +26,14 @@ mod original;
 mod photo;
 #[cfg(feature = "cli")]
 mod plain;
+mod point_cloud;
 mod resample;
 mod sample;
+mod source;
 mod split;
 mod tiff;
 mod tone;
+mod transforms;
 mod unplaced;
 mod view;
 
@@ -76,7 +80,9 @@ pub use orientation::{Orientation, SensorOrientation};
 pub use original::Original;
 pub use photo::Photo;
 pub use resample::downscale;
+pub use source::{is_capture, originals, photo_folder};
 pub use split::{Split, split, split_as};
+use transforms::Source;
 pub use unplaced::Unplaced;
 pub use view::{Observation, Point, View};
 #[cfg(feature = "cli")]
@@ -117,8 +123,12 @@ const NO_BASELINE: f64 = 1e-3;
 /// Photos with poses, and the sparse points seen in them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capture {
-    /// The COLMAP folder.
+    /// The folder of model and photos.
     pub root: PathBuf,
+    /// Folder that the photos' names are relative to.
+    pub photos: PathBuf,
+    /// Photos to train on and held-out ones, where the model says.
+    pub split: Option<Chosen>,
     /// The usable views, sorted by photo and then by name; at least one.
     pub views: Vec<View>,
     /// The usable points in the order of the file; at least one.
@@ -146,8 +156,9 @@ impl Capture {
         Self::load_with(dir, &LoadOptions::default())
     }
 
-    /// Loads a COLMAP folder: `images/` and a model in `sparse/0/`, `sparse/` or
-    /// the folder itself, `.bin` before `.txt`.
+    /// Loads a COLMAP folder: `images/` and a model in `sparse/0/`, `sparse/`, the folder itself or
+    /// `colmap/sparse/0/`, `.bin` before `.txt`; where there is none, the photos that
+    /// `transforms.json` lists. Without points, there are random ones.
     ///
     /// Views and points whose coordinates are not finite, or no rotation, and photos with a
     /// camera that cannot be are left out and named in `rejected`. Cameras without photos do
@@ -158,15 +169,13 @@ impl Capture {
     /// known model and a lens's calibration, a name leads out of `images/`, or
     /// nothing usable is left.
     pub fn load_with(dir: &Path, options: &LoadOptions) -> Result<Self, CaptureError> {
-        if !dir.is_dir() {
-            return Err(CaptureError::NoFolder { dir: dir.into() });
-        }
-        let photos = dir.join(IMAGES);
-        if !photos.is_dir() {
-            return Err(CaptureError::NoImagesFolder { dir: dir.into() });
-        }
         let chosen = options.chosen.as_ref();
-        let model = colmap::read(dir, chosen)?;
+        let Source {
+            mut model,
+            photos,
+            missing,
+            split,
+        } = source::read(dir, chosen)?;
         // Tracks know an image by its place in the file.
         let mut images: Vec<_> = model.images.into_iter().enumerate().collect();
         images.sort_by(|(_, a), (_, b)| a.name.cmp(&b.name));
@@ -187,6 +196,7 @@ impl Capture {
             .collect();
 
         let (mut views, mut rejected) = (Vec::new(), not_placed(chosen, &images));
+        rejected.extend(missing);
         let mut distortion: f64 = 0.0;
         // The first camera that cannot be.
         let mut impossible = None;
@@ -245,6 +255,14 @@ impl Capture {
         check_photos_exist(&views)?;
 
         let mut points = model.points;
+        if points.is_empty() && source::lists_photos(dir) {
+            points = guess::points(&views);
+            model.doubts.push(format!(
+                "{}: names no points (ply_file_path): starting from {} random ones where the cameras look; COLMAP's would be better",
+                model.points_path.display(),
+                guess::COUNT
+            ));
+        }
         rejected.extend(retain_places(&mut points, &model.points_path)?);
         for point in &mut points {
             point.track.retain_mut(|seen| match view_at[seen.view] {
@@ -256,6 +274,8 @@ impl Capture {
         }
         let mut capture = Self {
             root: dir.into(),
+            photos,
+            split,
             views,
             points,
             offset: DVec3::ZERO,
@@ -303,6 +323,16 @@ impl Capture {
             && self.views.len() > 1
             && apart.fold(0.0, f64::max)
                 <= NO_BASELINE * *distances.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
+    /// Paths of all photos below [`Self::photos`], also of those without a pose.
+    pub fn all_photos(&self) -> Vec<String> {
+        match source::lists_photos(&self.root) {
+            true => first_views(&self.views)
+                .map(|view| view.photo.clone())
+                .collect(),
+            false => photos_in(&self.photos),
+        }
     }
 
     /// The mean of the camera centers.

@@ -58,6 +58,7 @@ fn load(rigs: &str, frames: &str) -> Result<Capture, String> {
         fs::remove_dir_all(&sparse).unwrap();
         capture.map(|capture| Capture {
             root: "scene".into(),
+            photos: "scene/images".into(),
             doubts: (capture.doubts.iter())
                 .map(|doubt| doubt.replace(&*dir.path().to_string_lossy(), "scene"))
                 .collect(),

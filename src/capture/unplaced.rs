@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::names::{composed, photos_in};
-use super::{Capture, CaptureError, IMAGES, colmap, first_views};
+use super::source::lists_photos;
+use super::{Capture, CaptureError, colmap, first_views};
 
 /// A share of the photos without a pose that is not worth a word: COLMAP seldom places all.
 const USUAL: f64 = 0.1;
@@ -30,12 +31,15 @@ impl Unplaced {
     /// # Errors
     /// If the capture's model is gone.
     pub fn of(capture: &Capture) -> Result<Option<Self>, CaptureError> {
+        if lists_photos(&capture.root) {
+            return Ok(None);
+        }
         let views = first_views(&capture.views);
         let used: BTreeSet<String> = views.map(|view| composed(&view.photo)).collect();
         let rejected = capture.rejected.iter();
         let rejected: BTreeSet<String> = rejected.map(|photo| composed(&photo.name)).collect();
         let (mut placed, mut others) = (used.len(), 0);
-        for name in photos_in(&capture.root.join(IMAGES)) {
+        for name in photos_in(&capture.photos) {
             let name = composed(&name);
             // That a photo was left out for another reason has been said.
             placed += usize::from(rejected.contains(&name));

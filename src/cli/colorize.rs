@@ -20,7 +20,7 @@ use crate::chroma::{
     teacher::{TeacherSettings, Upsample},
 };
 use crate::report::timings_table;
-use crate::run::{ColorizeRequest, TeachOptions, colorize};
+use crate::run::{ColorizeRequest, TeachOptions, TeacherCommand, colorize};
 
 /// Methods of upsampling a teacher's output to the photo's size.
 const UPSAMPLE: &[(Upsample, &str)] = &[
@@ -68,10 +68,17 @@ pub struct Colorize {
     #[arg(
         long,
         value_name = "NAME|FILE.onnx|DIR|photos",
-        required_unless_present = "hints",
+        required_unless_present_any = ["hints", "teacher_command"],
         help_heading = TEACHER
     )]
     teacher: Vec<PathBuf>,
+    /// Program that colors photos: 'python mine.py {in} {out}'; {in_dir} {out_dir} for all at once.
+    ///
+    /// {in} is a gray PNG of 8 bits, {out} where to write the colored picture, of any size. For
+    /// {in_dir} and {out_dir} it starts once, and names its pictures like those it is given. Words
+    /// are split as a shell does, but no shell runs: variables and pipes mean nothing.
+    #[arg(long, value_name = "COMMAND", value_parser = command, help_heading = TEACHER, hide_short_help = true)]
+    teacher_command: Option<String>,
     /// Weight of each --teacher, in the order given [default: equal].
     #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = positive::<f32>, requires = "teacher", help_heading = TEACHER)]
     weights: Vec<f32>,
@@ -154,6 +161,11 @@ pub struct Colorize {
     timings: bool,
 }
 
+/// A command line that names pictures.
+fn command(text: &str) -> Result<String, String> {
+    TeacherCommand::parse(text).map(|_| text.to_owned())
+}
+
 /// A residual; `off` is one that is never reached.
 fn robust(text: &str) -> Result<f32, String> {
     match text {
@@ -174,20 +186,24 @@ fn degree(text: &str) -> Result<Degree, String> {
 }
 
 impl Colorize {
-    /// The teachers with their weights; ends the program where these are not as
+    /// The weights of all teachers, the program's last; ends the program where there are not as
     /// many.
-    fn teachers(&self) -> Vec<(PathBuf, f32)> {
-        let (teachers, weights) = (&self.teacher, &self.weights);
-        if !weights.is_empty() && weights.len() != teachers.len() {
+    fn all_weights(&self) -> Vec<f32> {
+        let (weights, count) = (
+            &self.weights,
+            self.teacher.len() + usize::from(self.teacher_command.is_some()),
+        );
+        if !weights.is_empty() && weights.len() != count {
             let message = format!(
-                "--weights names {} numbers for {} teachers: give one for each --teacher",
+                "--weights names {} numbers for {count} teachers: give one for each --teacher",
                 weights.len(),
-                teachers.len()
             );
             refuse(ErrorKind::WrongNumberOfValues, message);
         }
-        let weights = weights.iter().copied().chain(std::iter::repeat(1.0));
-        teachers.iter().cloned().zip(weights).collect()
+        match weights.is_empty() {
+            true => vec![1.0; count],
+            false => weights.clone(),
+        }
     }
 
     /// The solver's settings with what was said of them.
@@ -238,9 +254,13 @@ impl Colorize {
         let settings = self.settings();
         let run = self.run.as_deref().unwrap_or("colorize".as_ref());
         let live = self.view.begin(run)?;
+        let mut weights = self.all_weights();
+        let command = self.teacher_command.zip(weights.last().copied());
+        weights.truncate(self.teacher.len());
         let options = ColorizeRequest {
             teach: TeachOptions {
-                teachers: self.teachers(),
+                teachers: self.teacher.into_iter().zip(weights).collect(),
+                command,
                 settings: TeacherSettings {
                     upsample: self.upsample,
                     ..self.network.settings()

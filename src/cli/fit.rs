@@ -39,7 +39,7 @@ const CURVE_ROWS: usize = 8;
 A finished run is trained further with its own photos and settings:
   gs-chroma fit runs/house --iterations 5000")]
 pub struct Fit {
-    /// COLMAP folder with images/ and sparse/, a finished run to train further, or a block of a
+    /// COLMAP folder, one with transforms.json, a finished run to train further, or a block of a
     /// job of `partition`.
     #[arg(value_name = "COLMAP_DIR|RUN|BLOCK")]
     colmap_dir: PathBuf,

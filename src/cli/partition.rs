@@ -22,7 +22,7 @@ use crate::{
   gs-chroma fit job/coarse
   gs-chroma fit job/block-1")]
 pub struct Partition {
-    /// COLMAP folder with images/ and sparse/.
+    /// COLMAP folder with images/ and sparse/, or one with transforms.json.
     colmap_dir: PathBuf,
     /// Job folder to write.
     #[arg(short, long, value_name = "JOB", value_parser = folder())]

@@ -22,7 +22,7 @@ use crate::run::{PlanOptions, PlanReport, Preset, plan};
   gs-chroma plan house
   gs-chroma plan house --json")]
 pub struct Plan {
-    /// COLMAP folder with images/ and sparse/.
+    /// COLMAP folder with images/ and sparse/, or one with transforms.json.
     colmap_dir: PathBuf,
     /// How much work fit would do [default: paper on a GPU, else draft].
     #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]

@@ -28,7 +28,7 @@ use crate::{
   gs-chroma tradeoff house --preset balanced -- --max-side 800 --masks off
   gs-chroma tradeoff house --teacher ddcolor-tiny --knobs iterations,max-side,rounds --budget 60")]
 pub struct Tradeoff {
-    /// COLMAP folder with images/ and sparse/.
+    /// COLMAP folder with images/ and sparse/, or one with transforms.json.
     colmap_dir: PathBuf,
     /// Folder for points and results [default: runs/<folder name>-tradeoff].
     #[arg(short, long, help_heading = OUTPUT, value_name = "DIR", value_parser = folder())]

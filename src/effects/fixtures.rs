@@ -46,6 +46,8 @@ pub fn capture(photos: &[(Photo, Camera)], points: impl IntoIterator<Item = DVec
     });
     Capture {
         root: ".".into(),
+        photos: "images".into(),
+        split: None,
         views: views.collect(),
         points: (points.into_iter())
             .map(|position| Point {

@@ -5,8 +5,9 @@
 pub enum GpuError {
     /// There is no adapter to run on.
     #[error(
-        "no Vulkan, Metal or DirectX 12 adapter found ({0}): install a graphics driver, or a software one \
-         (Debian: apt-get install mesa-vulkan-drivers)"
+        "no Vulkan, Metal or DirectX 12 adapter found ({0}): install the graphics driver, or a software one \
+         (Debian, Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1; Fedora: dnf install \
+         mesa-vulkan-drivers vulkan-loader; macOS and Windows bring theirs, virtual machines may lack it)"
     )]
     NoAdapter(String),
     /// No adapter has the name in the environment variable.

@@ -17,7 +17,9 @@ pub enum PrepareError {
     #[error(transparent)]
     Program(#[from] ProgramError),
     /// There is neither COLMAP nor its Python module.
-    #[error("COLMAP is not installed: install it (Debian, Ubuntu: apt-get install colmap)")]
+    #[error(
+        "COLMAP is not installed: install it (Debian, Ubuntu: apt-get install colmap; macOS: brew install colmap; others: https://colmap.github.io/install.html)"
+    )]
     NoColmap,
     /// COLMAP knows no such camera model.
     #[error("COLMAP {version} does not know the lens {lens}: install a newer one")]

@@ -66,9 +66,11 @@ impl ProgramError {
 fn remedy(program: &str) -> &'static str {
     match program {
         "ffmpeg" | "ffprobe" => {
-            "install FFmpeg 5.1 or newer (Debian, Ubuntu: apt-get install ffmpeg)"
+            "install FFmpeg 5.1 or newer (Debian, Ubuntu: apt-get install ffmpeg; Fedora: dnf install ffmpeg-free; macOS: brew install ffmpeg; Windows: winget install Gyan.FFmpeg)"
         }
-        "colmap" => "install COLMAP (Debian, Ubuntu: apt-get install colmap)",
+        "colmap" => {
+            "install COLMAP (Debian, Ubuntu: apt-get install colmap; macOS: brew install colmap; others: https://colmap.github.io/install.html)"
+        }
         _ => "install it",
     }
 }

@@ -20,6 +20,7 @@ mod render;
 mod seams;
 mod stages;
 mod teach;
+mod teacher_command;
 mod viewed;
 
 use std::path::PathBuf;
@@ -40,6 +41,7 @@ pub use plan::{PlanOptions, PlanReport, plan};
 pub use render::{PathOptions, PathShape, RenderOptions, Rendered, Views, render, render_path};
 pub use seams::{SeamViews, ViewMean};
 pub use teach::{TeachOptions, teacher_or_photos};
+pub use teacher_command::TeacherCommand;
 pub use viewed::ViewedScene;
 
 pub use crate::luma::Preset;
@@ -87,6 +89,19 @@ pub enum RunError {
     /// A program of others, such as FFmpeg.
     #[error(transparent)]
     Program(#[from] ProgramError),
+    /// A command line is none.
+    #[error("{0}")]
+    Command(String),
+    /// The program that colors photos has written no such picture.
+    #[error("{program}: {picture}: {reason}")]
+    TeacherCommand {
+        /// The program, as it was started.
+        program: String,
+        /// Name of the picture.
+        picture: String,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// Coordinates that are too large for a splat file.
     #[error(
         "{}: not written: near {coordinate} 32-bit floats are {step} apart, {:.2} times the size of the Gaussians (the median of their smallest scales is {size:.4})",

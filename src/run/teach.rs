@@ -14,7 +14,7 @@ use super::{
     answers::{mean, scaled, with_hints, with_strokes},
 };
 use crate::{
-    capture::{Capture, Dataset, FRAMES, IMAGES, photos_in},
+    capture::{Capture, Dataset, FRAMES, photo_folder, photos_in},
     chroma::{
         Colorizer, ColorizerError, Supervision, ViewTarget, teach,
         teacher::{
@@ -32,6 +32,10 @@ use crate::{
 pub struct TeachOptions {
     /// Teachers and their weights, above 0; may be empty where there are hints.
     pub teachers: Vec<(PathBuf, f32)>,
+    /// A program that colors the photos, see [`TeacherCommand`](super::TeacherCommand), and its
+    /// weight.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command: Option<(String, f32)>,
     pub settings: TeacherSettings,
     /// Factor of their a and b, 0 to 1.
     pub strength: f32,
@@ -46,6 +50,7 @@ impl Default for TeachOptions {
     fn default() -> Self {
         Self {
             teachers: Vec::new(),
+            command: None,
             settings: TeacherSettings::default(),
             strength: 1.0,
             hints: None,
@@ -72,12 +77,12 @@ impl TeachOptions {
 /// The teacher that stands for the photos themselves.
 const PHOTOS: &str = "photos";
 
-/// The file, folder or name that `teacher` stands for: `photos` are those of the COLMAP folder,
+/// The file, folder or name that `teacher` stands for: `photos` are those of the capture,
 /// whatever lies here under that name, as the photos that it was prepared from often do;
 /// `photos/` is a folder.
 pub fn teacher_or_photos(teacher: &Path, colmap_dir: &Path) -> PathBuf {
     if teacher.as_os_str() == PHOTOS {
-        colmap_dir.join(IMAGES)
+        photo_folder(colmap_dir)
     } else {
         teacher.to_owned()
     }
@@ -226,6 +231,22 @@ impl Teachers {
             hints: hints.transpose()?,
             grow_hints: options.grow_hints,
         })
+    }
+
+    /// Adds a folder of images.
+    pub fn add(
+        &mut self,
+        folder: PathBuf,
+        weight: f32,
+        options: &TeachOptions,
+    ) -> Result<(), RunError> {
+        self.teachers.push(Member {
+            teacher: Teacher::open(&folder, None, &options.settings)?,
+            weight,
+            partial: false,
+            path: folder,
+        });
+        Ok(())
     }
 
     /// Returns true if settings for networks were given, but no teacher is one.
@@ -400,10 +421,13 @@ fn unplaced(
     dataset: &Dataset,
     covers: impl Fn(&str) -> Result<bool, TeacherError>,
 ) -> Result<Option<(String, usize)>, RunError> {
-    let root = &dataset.capture.root;
+    let capture = &dataset.capture;
     // All frames of a film, which are more than its photos.
-    let [frames, photos] = [FRAMES, IMAGES].map(|folder| photos_in(&root.join(folder)));
-    let all = if frames.is_empty() { photos } else { frames };
+    let frames = photos_in(&capture.root.join(FRAMES));
+    let all = match frames.is_empty() {
+        true => capture.all_photos(),
+        false => frames,
+    };
     let mut named = Vec::new();
     for name in &all {
         if covers(name)? {
@@ -452,7 +476,7 @@ fn gray_images(
     if in_gray == 0 {
         return Ok(None);
     }
-    if in_gray == answered && *path == dataset.capture.root.join(IMAGES) {
+    if in_gray == answered && *path == dataset.capture.photos {
         return Err(RunError::GrayPhotos(path.clone()));
     }
     Ok(Some(format!(

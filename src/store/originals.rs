@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::{RunFolder, entries::ENTRIES};
 use crate::{
-    capture::{FRAMES, Film, IMAGES, MaskSource},
+    capture::{self, FRAMES, Film, MaskSource},
     disk::{
         self,
         trust::{FileId, Originals},
@@ -68,10 +68,9 @@ impl OriginalFiles {
     /// Adds photos, masks, model and film of a COLMAP folder, and what it was prepared from.
     pub fn with_capture(self, root: &Path, masks: Option<&MaskSource>) -> Self {
         let mut kept = self
-            .with(&root.join(IMAGES), "a photo")
+            .with_all(&capture::originals(root), "a photo or a file of its poses")
             .with(&root.join(FRAMES), "a frame of the film")
-            .with(&root.join("masks"), "a mask")
-            .with(&root.join("sparse"), "a file of the COLMAP model");
+            .with(&root.join("masks"), "a mask");
         if let Some(MaskSource::Folder(folder)) = masks {
             kept = kept.with(folder, "a mask");
         }

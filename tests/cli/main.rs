@@ -32,6 +32,7 @@ mod hostile;
 mod inspect;
 mod masks;
 mod names;
+mod package;
 mod pages;
 mod paths;
 mod photos;
@@ -50,10 +51,13 @@ mod splat_file;
 mod strokes;
 mod teach;
 mod teach_together;
+#[cfg(unix)]
+mod teacher_command;
 #[cfg(target_os = "linux")]
 mod terminal;
 mod tradeoff;
 mod train;
+mod transforms;
 mod turned;
 mod variants;
 mod view;

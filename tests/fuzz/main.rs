@@ -214,6 +214,45 @@ fn models() {
     }
 }
 
+#[test]
+fn transforms_and_their_points() {
+    let place = place();
+    fs::remove_dir_all(place.path().join("sparse")).expect("a model");
+    let frame = |view: usize| {
+        let name = scene::name(view);
+        format!(
+            "{{\"file_path\":\"images/{name}\",\"transform_matrix\":[[1,0,0,{view}],[0,1,0,0],[0,0,1,0]]}}"
+        )
+    };
+    let frames: Vec<String> = (0..scene::VIEWS).map(frame).collect();
+    let json = format!(
+        "{{\"w\":64,\"h\":48,\"fl_x\":60.5,\"k1\":0.01,\"ply_file_path\":\"points.ply\",\"frames\":[{}]}}",
+        frames.join(",")
+    );
+    let ply = b"ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty double x\nproperty float y\nproperty float z\nproperty uchar red\nend_header\n0123456789abcdefg0123456789abcdefg";
+    let paths = ["transforms.json", "points.ply"].map(|name| place.path().join(name));
+    for (path, file) in paths.iter().zip([json.as_bytes(), ply]) {
+        fs::write(path, file).expect("writable");
+    }
+    for path in paths {
+        let corpus = vec![fs::read(&path).expect("a file")];
+        let name = path
+            .file_name()
+            .expect("a name")
+            .to_string_lossy()
+            .replace('.', "-");
+        survives(&Kind {
+            name: &name,
+            corpus: corpus.clone(),
+            path: path.clone(),
+            read: &|_| Capture::load(place.path()).is_ok(),
+            memory: PLAIN,
+            cases: 300,
+        });
+        fs::write(path, &corpus[0]).expect("writable");
+    }
+}
+
 /// A photo of the small scene as files of every kind.
 fn pictures() -> [(&'static str, Vec<Vec<u8>>); 3] {
     use image::ImageFormat::{Jpeg, Png};

@@ -14,11 +14,11 @@ use std::path::{Path, PathBuf};
 
 use super::{Chosen, error::CaptureError};
 use model::IMAGE;
-pub(super) use model::{Camera, Image, Model};
+pub(super) use model::{Camera, Image, Model, lens as checked_lens, relative_name};
 use records::RecordSource;
 
-/// Finds the model of a COLMAP folder and reads it: `sparse/0`, then `sparse`,
-/// then the folder itself; `.bin` before `.txt`. Of images that were not chosen nothing is
+/// Finds the model of a COLMAP folder and reads it: `sparse/0`, then `sparse`, the folder itself
+/// and `colmap/sparse/0`; `.bin` before `.txt`. Of images that were not chosen nothing is
 /// kept, nor of points that only these show.
 pub(super) fn read(root: &Path, chosen: Option<&Chosen>) -> Result<Model, CaptureError> {
     let (paths, extension) = find(root)?;
@@ -55,7 +55,8 @@ type Files = ([PathBuf; 3], &'static str);
 
 fn find(root: &Path) -> Result<Files, CaptureError> {
     let mut incomplete = None;
-    for dir in [root.join("sparse/0"), root.join("sparse"), root.into()] {
+    let places = ["sparse/0", "sparse", "", "colmap/sparse/0"];
+    for dir in places.map(|place| root.join(place)) {
         match files_in(&dir) {
             Ok(files) => return Ok(files),
             Err(error) => incomplete = incomplete.or(error),

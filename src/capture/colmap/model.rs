@@ -94,7 +94,7 @@ impl Cameras {
 }
 
 /// Checks a camera record.
-pub(super) fn lens(
+pub(in crate::capture) fn lens(
     model: ModelName,
     width: u64,
     height: u64,
@@ -111,7 +111,7 @@ pub(super) fn lens(
 ///
 /// Backslashes, which Windows tools write, count as separators. A name that is
 /// empty, absolute or contains `..` is refused: it would read other people's files.
-pub(super) fn relative_name(name: &str) -> Result<String, String> {
+pub(in crate::capture) fn relative_name(name: &str) -> Result<String, String> {
     let name = name.replace('\\', "/");
     let drive = name.get(1..2) == Some(":");
     let parts: Vec<&str> = name

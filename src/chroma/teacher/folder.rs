@@ -4,7 +4,7 @@ use super::named_images::NamedImages;
 use super::settings::file_name;
 use super::shown::SampleSheet;
 use super::{AbImage, GrayImage, Query, TeacherError, TeacherInfo};
-use crate::capture::{Capture, IMAGES};
+use crate::capture::Capture;
 use crate::color::srgb_to_lab;
 use image::{DynamicImage, Rgb, Rgb32FImage};
 use std::cell::RefCell;
@@ -53,8 +53,7 @@ impl FolderTeacher {
     /// Says which photos there are, so that an image of one is not taken for another's.
     pub fn know(&mut self, capture: &Capture) {
         self.images.know(capture);
-        let [own, photos] =
-            [&self.folder, &capture.root.join(IMAGES)].map(|dir| dir.canonicalize());
+        let [own, photos] = [&self.folder, &capture.photos].map(|dir| dir.canonicalize());
         self.of_photos = matches!((own, photos), (Ok(own), Ok(photos)) if own == photos);
     }
 
@@ -244,6 +243,8 @@ mod tests {
         };
         let mut capture = Capture {
             root: folder.path().into(),
+            photos: folder.path().join("images"),
+            split: None,
             views: vec![view("shot0.jpg"), view("shot0.png")],
             points: Vec::new(),
             offset: glam::DVec3::ZERO,

@@ -304,6 +304,8 @@ mod tests {
         };
         Capture {
             root: folder.into(),
+            photos: folder.join("images"),
+            split: None,
             views: vec![crate::capture::View {
                 name: "v.png".into(),
                 photo: "v.png".into(),

@@ -36,6 +36,8 @@ pub use folder::FolderTeacher;
 pub use hints::{HintFolder, HintImage};
 pub use images::{AbImage, GrayImage};
 pub(super) use images::{Filter, resample};
+#[cfg(feature = "cli")]
+pub(crate) use named_images::ASPECT_TOLERANCE;
 pub use network::{NetworkTeacher, ProfileSource};
 pub use query::Query;
 pub use settings::{TeacherDevice, TeacherInfo, TeacherSettings};

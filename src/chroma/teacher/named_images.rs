@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 /// Tolerance between the aspects of photo and image: rounding to whole pixels in a tool that works
 /// at a small size, not another cut of the photo.
-const ASPECT_TOLERANCE: f64 = 0.02;
+pub const ASPECT_TOLERANCE: f64 = 0.02;
 
 /// Images for any subset of the photos.
 ///

@@ -39,8 +39,13 @@ pub(crate) fn environment() -> Result<Environment, TeacherError> {
     if let Some(environment) = environment.as_ref() {
         return Ok(environment.clone());
     }
+    let cached = cache_folder(FOLDER);
+    // Where pip puts the Python package.
+    let by_pip = cached
+        .as_ref()
+        .map(|folder| folder.join("onnxruntime/capi"));
     let folders = Invocation::present().libraries.iter().cloned();
-    let folders = folders.chain(cache_folder(FOLDER));
+    let folders = folders.chain(cached).chain(by_pip);
     let named = env::var_os(LIBRARY_VARIABLE).filter(|path| !path.is_empty());
     let built = match find(named.map(PathBuf::from), folders) {
         Some(path) => load(&path)?,

@@ -7,7 +7,10 @@ use glam::DVec3;
 use super::request::{ColorizeRequest, Output};
 use crate::{
     capture::{Dataset, LoadOptions},
-    chroma::ChromaSettings,
+    chroma::{
+        ChromaSettings,
+        teacher::{TeacherError, cache_folder},
+    },
     disk::trust::Originals,
     effects::Overrules,
     gpu::Gpu,
@@ -15,7 +18,7 @@ use crate::{
     raster::Raster,
     report::LumaReport,
     run::{
-        RunError,
+        RunError, TeacherCommand,
         teach::{TeacherAnswers, Teachers},
     },
     splats::{Format, Splats, WriteOptions},
@@ -77,7 +80,7 @@ impl<'a> Coloring<'a> {
             .with(&opened.file(true), "the gray scene");
         let kept = opened.keep(kept).keep();
         let cache = opened.folder().map(RunFolder::teacher);
-        let teachers = Teachers::open(&request.teach, &colmap, cache.as_deref())?;
+        let mut teachers = Teachers::open(&request.teach, &colmap, cache.as_deref())?;
         observe(Event::begins(Stage::Device));
         let gpu = Gpu::open_timed(request.timings)?;
         let usual = Preset::for_device(&gpu);
@@ -86,6 +89,13 @@ impl<'a> Coloring<'a> {
         // show something else.
         let trusted = request.relight || (opened.run().is_some() && request.colmap.is_none());
         let dataset = photos(request, &opened, preset, trusted, observe)?;
+        if let Some((command, weight)) = &request.teach.command {
+            let kept = cache.or_else(|| cache_folder("commands"));
+            let kept = kept.ok_or(TeacherError::NoCacheFolder)?;
+            let command = TeacherCommand::parse(command).map_err(RunError::Command)?;
+            let folder = command.color(&dataset, &kept, observe)?;
+            teachers.add(folder, *weight, &request.teach)?;
+        }
         let read = opened.read(true, Some(&dataset.capture), observe)?;
         let luma = read.splats.to_luma();
         let trained = match opened.report() {

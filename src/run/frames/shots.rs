@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, ops::Range, path::PathBuf};
 
 use crate::{
-    capture::{CaptureError, Dataset, FRAMES, Film, IMAGES, names::by_number, photos_in},
+    capture::{CaptureError, Dataset, FRAMES, Film, names::by_number},
     run::RunError,
     store::distinct,
 };
@@ -44,11 +44,11 @@ pub(super) fn shots_of(
     let (folder, names) = match film {
         Some(film) => (root.join(FRAMES), film.frames.clone()),
         None => {
-            let mut names = photos_in(&root.join(IMAGES));
+            let mut names = dataset.capture.all_photos();
             names.extend(views.keys().map(|&name| name.to_owned()));
             names.sort_by(|a, b| by_number(a, b));
             names.dedup();
-            (root.join(IMAGES), names)
+            (dataset.capture.photos.clone(), names)
         }
     };
     let plain: Vec<&str> = names.iter().map(String::as_str).collect();
