@@ -343,6 +343,15 @@ async function begin() {
   reset();
   at("poster").hidden = true;
   if (about.live) follow();
+  if (about.paint) await (await import("./paint.js")).paint({ about, jump, recolor, dragWipe });
+}
+
+/** Shows the scene in other colors: halves as its own. */
+function recolor(colors) {
+  const scene = scenes.get("color");
+  if (colors.length !== scene.colors.length) return load("color").then(redraw);
+  renderer.recolor(scene, colors);
+  redraw();
 }
 
 /** For scripts: `await gsChroma.ready`, then `await gsChroma.picture(k)`. */

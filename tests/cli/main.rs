@@ -33,6 +33,7 @@ mod inspect;
 mod masks;
 mod names;
 mod pages;
+mod paint;
 mod paths;
 mod photos;
 mod picture;
