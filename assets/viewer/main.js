@@ -223,7 +223,8 @@ async function measure(k) {
 
 function showStatus() {
   const { count, degree } = scenes.get(main) ?? {};
-  if (count === undefined) return;
+  // Paint mode has a status of its own.
+  if (count === undefined || about.paint) return;
   const facts = [`${count.toLocaleString("en")} Gaussians, degree ${degree}`];
   if (about.live) facts.push(about.live);
   if (photographed !== null) {

@@ -9,6 +9,7 @@ const WHEEL = 184;
 const ZOOM = [0.05, 40];
 const WHEEL_STEP = 0.0015;
 const AGAIN = 2000;
+const RESTS = 250;
 
 const linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
 const encoded = (v) => (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055);
@@ -53,6 +54,9 @@ export function colorAt(l, [a, b]) {
   }
   return bytes(labToRgb([l, a, b]));
 }
+
+/** a and b at a lightness over those at the middle one: the same surface under other light. */
+const shade = (l) => (Math.max(l, 10) + 16) / 66;
 
 const css = ([r, g, b]) => `rgb(${r} ${g} ${b})`;
 
@@ -100,7 +104,7 @@ const KEYS = `<h2>Keys</h2><table>
 export async function paint(page) {
   const { about, jump, recolor, dragWipe } = page;
   const at = (id) => document.getElementById(id);
-  const { photos, command } = about.paint;
+  const { photos } = about.paint;
   const root = document.createElement("section");
   root.id = "paint";
   root.innerHTML = PAGE;
@@ -118,8 +122,11 @@ export async function paint(page) {
   let versus = "none";
   let wipe = 0.5;
   let size = 24;
-  let ab = [30, 40];
+  /** The color of the brush: a and b at the middle lightness. */
+  let paintOf = [30, 40];
+  /** Lightness that the wheel shows: that under the brush, once it rests. */
   let lightness = 60;
+  let resting = null;
   let showsStrokes = false;
   let doubts = false;
   /** Pictures of the photo: result, gray, layer and what is compared with. */
@@ -227,15 +234,13 @@ export async function paint(page) {
     draw();
   }
 
-  /** The part of the easel that nothing lies over. */
+  /** The part of the easel that nothing lies over: left, top, right, bottom. */
   function room() {
-    const box = easel.getBoundingClientRect();
-    const narrow = box.width < 700;
-    const strip = at("strip").getBoundingClientRect();
-    const top = Math.max(...["paint-bar", "brushes"].map((id) => (id === "brushes" && !narrow ? 0 : at(id).getBoundingClientRect().bottom)));
-    const side = narrow ? 0 : at("mixer").getBoundingClientRect().width + 20;
-    const left = narrow ? 0 : at("brushes").getBoundingClientRect().right;
-    return [left + 12, top + 12, Math.max(left + 60, box.width - side - 12), Math.max(top + 60, strip.top - 12)];
+    const [all, brushes, mixer, strip] = [easel, at("brushes"), at("mixer"), at("strip")].map((part) => part.getBoundingClientRect());
+    const narrow = mixer.left < all.width / 2;
+    const [left, top] = narrow ? [0, brushes.bottom] : [brushes.right, at("paint-bar").getBoundingClientRect().bottom];
+    const [right, bottom] = narrow ? [all.width, mixer.top] : [mixer.left, strip.top];
+    return [left + 12, top + 12, Math.max(left + 60, right - 12), Math.max(top + 60, bottom - 12)];
   }
 
   const toPhoto = ({ clientX, clientY }) => [(clientX - view.x) / view.scale, (clientY - view.y) / view.scale];
@@ -263,7 +268,6 @@ export async function paint(page) {
       }
       if (shown.layer && (showsStrokes || tool === "eraser")) pen.drawImage(shown.layer, 0, 0, w, h);
       for (const drawn of [...pending, stroke]) if (drawn && drawn.photo === photo) trace(drawn);
-      if (doubts) marks();
       ring();
       placeWipe();
     });
@@ -279,25 +283,6 @@ export async function paint(page) {
       pen.moveTo(x0, y0);
       pen.lineTo(x1 + 1e-3, y1);
       pen.stroke();
-    }
-  }
-
-  function marks() {
-    for (const [k, [of, [x, y]]] of (news.doubt ?? []).entries()) {
-      if (of !== photo) continue;
-      const r = 16 / view.scale;
-      pen.lineWidth = 2 / view.scale;
-      pen.strokeStyle = "#fff";
-      pen.fillStyle = "#000a";
-      pen.beginPath();
-      pen.arc(x, y, r, 0, 7);
-      pen.fill();
-      pen.stroke();
-      pen.fillStyle = "#fff";
-      pen.font = `600 ${15 / view.scale}px system-ui, sans-serif`;
-      pen.textAlign = "center";
-      pen.textBaseline = "middle";
-      pen.fillText(k + 1, x, y);
     }
   }
 
@@ -352,7 +337,7 @@ export async function paint(page) {
   function mix() {
     const wheel = at("wheel").getContext("2d");
     const image = wheel.createImageData(WHEEL, WHEEL);
-    const l = Math.min(92, Math.max(12, lightness));
+    const l = lightness;
     for (let k = 0; k < WHEEL * WHEEL; k++) {
       const [a, b] = [k % WHEEL, Math.floor(k / WHEEL)].map((v) => ((v + 0.5) / WHEEL - 0.5) * 2 * REACH);
       if (Math.hypot(a, b) > REACH) continue;
@@ -361,6 +346,7 @@ export async function paint(page) {
       image.data.set([red, green, blue, shows(rgb) ? 255 : 60], 4 * k);
     }
     wheel.putImageData(image, 0, 0);
+    const ab = paintAt(l);
     const [x, y] = [ab[0], -ab[1]].map((v) => (v / (2 * REACH) + 0.5) * WHEEL);
     for (const [style, r] of [["#000", 7], ["#fff", 5.5]]) {
       wheel.strokeStyle = style;
@@ -384,9 +370,11 @@ export async function paint(page) {
     });
   }
 
+  const paintAt = (l) => paintOf.map((v) => v * shade(l));
+
   function take(color) {
-    const [, a, b] = rgbToLab(color);
-    ab = [a, b];
+    const [l, a, b] = rgbToLab(color);
+    paintOf = [a, b].map((v) => v / shade(l));
     if (tool !== "brush") choose("brush");
     mixSoon();
   }
@@ -395,7 +383,7 @@ export async function paint(page) {
     const box = at("wheel").getBoundingClientRect();
     const [a, b] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height].map((v) => (v - 0.5) * 2 * REACH);
     const far = Math.max(1, Math.hypot(a, b) / REACH);
-    ab = [a / far, -b / far];
+    paintOf = [a / far, -b / far].map((v) => v / shade(lightness));
     mixSoon();
   }
 
@@ -432,15 +420,30 @@ export async function paint(page) {
     return Math.max(0.5, (size / 2) * pressed);
   };
 
-  /** Sets the lightness of the wheel to that of the photo at a place. */
-  function look(place) {
-    const gray = shown.levels && pixel(shown.levels, place);
-    if (!gray) return;
-    const [l] = rgbToLab(gray);
-    if (Math.abs(l - lightness) > 1) {
-      lightness = l;
-      mixSoon();
+  /** The mean lightness of the photo under the brush. */
+  function lightnessAt([x, y]) {
+    if (!shown.levels) return lightness;
+    const reach = Math.min(12, size / 2);
+    let [sum, count] = [0, 0];
+    for (let j = -reach; j <= reach; j += Math.max(1, reach / 4)) {
+      for (let i = -reach; i <= reach; i += Math.max(1, reach / 4)) {
+        const gray = Math.hypot(i, j) <= reach && pixel(shown.levels, [x + i, y + j]);
+        if (gray) [sum, count] = [sum + rgbToLab(gray)[0], count + 1];
+      }
     }
+    return count > 0 ? sum / count : lightness;
+  }
+
+  /** Shows the wheel at the lightness of a place. */
+  function look(place) {
+    lightness = Math.min(92, Math.max(20, lightnessAt(place)));
+    mixSoon();
+  }
+
+  /** The same once the pointer rests there, and not on its way to the wheel. */
+  function lookSoon(place) {
+    clearTimeout(resting);
+    resting = setTimeout(() => look(place), RESTS);
   }
 
   function pick(place) {
@@ -461,7 +464,7 @@ export async function paint(page) {
     if (tool === "dropper" || event.altKey) return pick(place);
     look(place);
     note = "";
-    stroke = { photo, color: tool === "eraser" ? null : colorAt(lightness, ab), points: [[...place, radius(event)]] };
+    stroke = { photo, color: tool === "eraser" ? null : colorAt(lightness, paintAt(lightness)), points: [[...place, radius(event)]] };
     draw();
   }
 
@@ -476,7 +479,7 @@ export async function paint(page) {
         if (Math.hypot(x - x0, y - y0) >= Math.max(0.5, r / 6)) stroke.points.push([x, y, radius(one)]);
       }
     } else {
-      look(pointer);
+      lookSoon(pointer);
     }
     draw();
   }
@@ -528,12 +531,13 @@ export async function paint(page) {
   function showNews() {
     showStatus();
     showPalette();
+    at("copy").title = news.command;
     at("undo").disabled = news.undo === 0;
     at("redo").disabled = news.redo === 0;
     at("save").disabled = news.saved || news.state.phase === "saving";
     for (const [k, item] of [...at("strip").children].entries()) {
       item.classList.toggle("painted", news.painted.includes(k));
-      const next = doubts ? (news.doubt ?? []).findIndex(([of]) => of === k) : -1;
+      const next = doubts ? (news.doubt ?? []).indexOf(k) : -1;
       item.dataset.next = next < 0 ? "" : next + 1;
     }
   }
@@ -565,7 +569,7 @@ export async function paint(page) {
     if (tab === "scene") {
       jump(photos[photo].camera);
       recolored().catch(fail);
-    } else showStatus();
+    }
     draw();
   }
 
@@ -584,7 +588,7 @@ export async function paint(page) {
   }
 
   async function copy() {
-    await navigator.clipboard.writeText(command);
+    await navigator.clipboard.writeText(news.command);
     note = "command copied";
     showStatus();
   }
@@ -622,6 +626,7 @@ export async function paint(page) {
     for (const end of ["pointerup", "pointercancel"]) easel.addEventListener(end, up);
     easel.addEventListener("pointerleave", () => {
       pointer = null;
+      clearTimeout(resting);
       draw();
     });
     easel.addEventListener("wheel", zoom, { passive: false });
@@ -645,7 +650,6 @@ export async function paint(page) {
     at("redo").addEventListener("click", () => post("redo"));
     at("save").addEventListener("click", () => post("save"));
     at("copy").addEventListener("click", () => copy().catch(fail));
-    at("copy").title = command;
     dragWipe(at("paint-wipe"), easel, (share, event) => {
       const x = event ? event.clientX : easel.clientWidth * share;
       wipe = event ? Math.min(1, Math.max(0, (x - view.x) / (photos[photo].width * view.scale))) : share;

@@ -17,13 +17,13 @@ use super::{
 use crate::{
     capture::{Camera, Dataset, Photo, downscale},
     color::gray_to_lightness,
-    raster::{ColorKind, Raster, RenderedImage},
+    raster::{ColorKind, Raster},
     splats::{ShField, Splats, sh},
 };
 
 /// Rounds of a solve at most, and the mean change of the colors, in CIELAB units, that ends it.
 const ROUNDS: usize = 4;
-const SETTLED: f64 = 0.25;
+const SETTLED: f64 = 0.15;
 
 /// A share of the views below which those that a stroke changes are solved for alone first.
 const FEW: f64 = 0.5;
@@ -31,17 +31,12 @@ const FEW: f64 = 0.5;
 /// Pixels that decide a Gaussian's color in the map of doubt.
 const DECIDED: f32 = 4.0;
 
-/// Residual, in CIELAB units, that is doubted as much as what no view shows.
-const DOUBTED: f32 = 20.0;
+/// Mean residuals, in CIELAB units: what teachers are off anyway, and what is doubted as much as what
+/// no view shows.
+const DOUBTED: [f32; 2] = [6.0, 18.0];
 
 /// a and b of what is doubted wholly: orange.
 const TINT: [f32; 2] = [45.0, 60.0];
-
-/// Cells along a picture's longer side, of which the most doubted is marked, its mean doubt at
-/// least, and the radius around its middle that counts as one thing, as the longer side over this.
-const CELLS: usize = 20;
-const LEAST_DOUBT: f32 = 0.05;
-const AROUND: f32 = 6.0;
 
 /// A scene whose strokes change.
 pub struct Repainter<'a> {
@@ -67,8 +62,6 @@ pub struct Repainter<'a> {
     chroma: ShField,
     shown: ShField,
     corrections: Vec<Correction>,
-    /// Pixels that decide each Gaussian's color, once it was solved for.
-    seen: Vec<f32>,
     /// True until colors are known from which to go on.
     cold: bool,
 }
@@ -124,7 +117,6 @@ impl<'a> Repainter<'a> {
             shown: chroma.clone(),
             chroma,
             corrections: vec![Correction::NONE; views],
-            seen: Vec::new(),
             cold,
         })
     }
@@ -139,13 +131,10 @@ impl<'a> Repainter<'a> {
         let paint = &paint.resized(photo.width, photo.height);
         self.claims
             .paint(&self.frozen, [view, view], &photo, paint)?;
-        let had = match paint.is_empty() {
+        match paint.is_empty() {
             true => self.painted.remove(&view),
             false => self.painted.insert(view),
         };
-        if had {
-            self.stale.insert(view);
-        }
         let weights = self.claims.weights();
         let changed: Vec<usize> = (0..self.luma.len())
             .filter(|&i| weights.of(i) != self.weights.of(i))
@@ -244,14 +233,14 @@ impl<'a> Repainter<'a> {
             if tasks.is_empty() || !(few || whole) {
                 continue;
             }
-            match self.solve_for(tasks, whole, stop) {
-                Ok(done) => rounds += done,
+            let (done, seen) = match self.solve_for(tasks, whole, stop) {
                 Err(ChromaError::Cancelled) => return Ok(None),
-                Err(other) => return Err(other),
-            }
+                found => found?,
+            };
+            rounds += done;
             self.shown = self.chroma.clone();
-            if self.settings.fill {
-                fill_unseen(self.luma, &mut self.shown, &self.seen);
+            if self.settings.fill && whole {
+                fill_unseen(self.luma, &mut self.shown, &seen);
             }
             settles(&self.shown);
         }
@@ -295,13 +284,14 @@ impl<'a> Repainter<'a> {
         Ok(())
     }
 
-    /// Rounds of a solve for some views, whose corrections stay, or for the whole.
+    /// A solve for the whole, or for some views: their corrections stay, and what they do not show.
+    /// Gives the rounds, and in how many pixels each Gaussian shows.
     fn solve_for(
         &mut self,
         tasks: Vec<Task>,
         whole: bool,
         stop: &AtomicBool,
-    ) -> Result<usize, ChromaError> {
+    ) -> Result<(usize, Vec<f32>), ChromaError> {
         let settings = &ChromaSettings {
             correct_views: self.settings.correct_views && whole,
             ..self.settings.clone()
@@ -324,18 +314,27 @@ impl<'a> Repainter<'a> {
             rounds += 1;
             settled = !self.cold && moved.is_some_and(|moved| moved < SETTLED);
         }
-        self.seen = solver.seen()?;
+        let seen = solver.seen()?;
         if settings.correct_views {
             for (task, correction) in solver.corrections()? {
                 self.corrections[task.view] = correction;
             }
         }
-        self.chroma = solver.chroma()?;
+        let mut found = solver.chroma()?;
+        if !whole {
+            // Nothing but the pull toward gray moves what these views do not show.
+            let stride = found.coefficients.len() / seen.len().max(1);
+            let pairs = found.coefficients.iter_mut().zip(&self.shown.coefficients);
+            for (i, (value, before)) in pairs.enumerate() {
+                *value = before + seen[i / stride].min(1.0) * (*value - before);
+            }
+        }
+        self.chroma = found;
         self.cold = false;
         if self.painted.is_empty() {
             self.unpainted = self.chroma.clone();
         }
-        Ok(rounds)
+        Ok((rounds, seen))
     }
 
     /// Colors to be shown: the last ones, what no view shows filled in.
@@ -379,87 +378,53 @@ impl<'a> Repainter<'a> {
         Ok((sums.iter().enumerate())
             .map(|(i, &[apart, pixels])| {
                 let unseen = (1.0 - pixels / DECIDED).clamp(0.0, 1.0);
-                let apart = (apart / pixels.max(1e-6) / DOUBTED).min(1.0);
+                let apart = apart / pixels.max(1e-6) - DOUBTED[0];
+                let apart = (apart / (DOUBTED[1] - DOUBTED[0])).clamp(0.0, 1.0);
                 let claimed = whole_or_none(self.weights.of(i).1);
                 apart.max(unseen) * (1.0 - claimed)
             })
             .collect())
     }
 
-    /// A map of doubt, as a and b that tint the Gaussians by it, and so many places to paint next:
-    /// view and pixel.
+    /// A map of doubt, as a and b that tint the Gaussians by it, and so many views to paint next:
+    /// each shows most of what those before do not.
     ///
     /// # Errors
     /// [`ChromaError`] of the device or of the file that targets wait in.
-    pub fn doubt(&self, places: usize) -> Result<(ShField, Vec<(usize, [f32; 2])>), ChromaError> {
+    pub fn doubt(&self, views: usize) -> Result<(ShField, Vec<usize>), ChromaError> {
         let mut doubts = self.doubts()?;
         let one = 1.0 / sh::C0 as f32;
-        let tint = doubts
-            .iter()
-            .flat_map(|doubt| TINT.map(|value| one * doubt * value));
-        let tint = ShField {
-            coefficients: tint.collect(),
-            ..ShField::zeros(doubts.len(), 0, 2)
-        };
+        let mut tint = ShField::zeros(doubts.len(), 0, 2);
+        for (ab, doubt) in tint.coefficients.chunks_exact_mut(2).zip(&doubts) {
+            ab.copy_from_slice(&TINT.map(|value| one * doubt * value));
+        }
         let mut found = Vec::new();
-        for _ in 0..places {
+        for _ in 0..views.min(self.frozen.len()) {
             let mut field = ShField::zeros(doubts.len(), 0, 2);
-            for (value, doubt) in field.coefficients.iter_mut().step_by(2).zip(&doubts) {
-                *value = one * doubt;
+            for (ab, doubt) in field.coefficients.chunks_exact_mut(2).zip(&doubts) {
+                ab[0] = one * doubt;
             }
             let field = self.frozen.colors(&field)?;
-            let mut most = (LEAST_DOUBT, None);
+            let mut most = (0.0, None);
             for view in 0..self.frozen.len() {
                 let drawn = self.frozen.draw(view, &[&field])?;
-                let (doubt, place) = most_doubted(&drawn[0]);
+                let doubt: f32 = drawn[0].pixels.iter().sum();
                 if doubt > most.0 {
-                    most = (doubt, Some((view, place)));
+                    most = (doubt, Some(view));
                 }
             }
-            let Some((view, [x, y])) = most.1 else {
+            let Some(best) = most.1 else {
                 break;
             };
-            let (own, small) = (&self.dataset.cameras[view], self.size(view));
-            found.push((
-                view,
-                [
-                    x * own.width as f32 / small[0] as f32,
-                    y * own.height as f32 / small[1] as f32,
-                ],
-            ));
-            // What shows around is one thing with it.
-            let [width, height] = self.frozen.uniform(view, 0).size.map(|side| side as usize);
-            let reach = width.max(height) as f32 / AROUND;
-            let figures: Vec<[f32; 4]> = (0..width * height)
-                .map(|i| {
-                    let apart = ((i % width) as f32 - x).hypot((i / width) as f32 - y);
-                    [f32::from(apart < reach), 0.0, 0.0, 0.0]
-                })
-                .collect();
-            let around = self.frozen.gather(view, &figures)?;
-            for (doubt, around) in doubts.iter_mut().zip(around) {
-                *doubt *= (1.0 - around[0]).max(0.0);
+            found.push(best);
+            let pixels = self.frozen.uniform(best, 0).pixel_count();
+            let shown = self
+                .frozen
+                .gather(best, &vec![[1.0, 0.0, 0.0, 0.0]; pixels])?;
+            for (doubt, figures) in doubts.iter_mut().zip(shown) {
+                *doubt *= (1.0 - figures[0]).max(0.0);
             }
         }
         Ok((tint, found))
     }
-}
-
-/// Mean doubt of a picture's most doubted cell, and the cell's middle.
-fn most_doubted(picture: &RenderedImage) -> (f32, [f32; 2]) {
-    let [width, height] = [picture.width, picture.height].map(|side| side as usize);
-    let cell = (width.max(height) / CELLS).max(1);
-    let columns = width.div_ceil(cell);
-    let mut sums = vec![0.0; columns * height.div_ceil(cell)];
-    for (i, pixel) in picture.pixels.chunks_exact(picture.channels).enumerate() {
-        sums[i / width / cell * columns + i % width / cell] += pixel[0];
-    }
-    let best = (0..sums.len()).max_by(|&a, &b| sums[a].total_cmp(&sums[b]));
-    let best = best.unwrap_or(0);
-    let at = [best % columns, best / columns];
-    let middle = [0, 1].map(|k| {
-        let middle = (at[k] * cell) as f32 + 0.5 * cell as f32;
-        middle.min([width, height][k] as f32 - 1.0)
-    });
-    (sums[best] / (cell * cell) as f32, middle)
 }

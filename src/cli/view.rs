@@ -15,7 +15,6 @@ use crate::{
     run::ViewedScene,
     subject::Live,
     tell::Stage,
-    tradeoff::shell_line,
     view::{LiveContent, Request, Response, RunContent, Server, answer},
 };
 
@@ -54,8 +53,7 @@ impl View {
         let content = RunContent::new(viewed, &mut |event| progress.show(&event))?;
         if self.paint {
             let session = PaintSession::open(run, colmap, &mut |event| progress.show(&event))?;
-            let command = shell_line(&session.scene.command);
-            let content = PaintContent::new(content, session, command);
+            let content = PaintContent::new(content, session);
             let server = Server::bind(self.port)?.taking();
             progress.finish();
             return self.serve(&server, &name, move |request| content.answer(request));

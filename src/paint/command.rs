@@ -9,7 +9,7 @@ use crate::{
     store::RunFolder,
 };
 
-/// Words of `colorize` with the run's teachers and settings, and with the strokes in its folder.
+/// Words of `colorize` with the run's teachers and settings.
 pub fn words(folder: &RunFolder, report: &Report, colmap: Option<&Path>) -> Vec<String> {
     let text = |path: &Path| path.to_string_lossy().into_owned();
     let mut words = vec!["colorize".to_owned(), text(folder.path())];
@@ -21,8 +21,13 @@ pub fn words(folder: &RunFolder, report: &Report, colmap: Option<&Path>) -> Vec<
         of_teachers(chroma, &mut add);
         of_settings(chroma, &mut add);
     }
-    add("hints", text(&folder.hints()));
     words
+}
+
+/// The words that add the strokes in a run's folder.
+pub fn hints(folder: &RunFolder) -> [String; 2] {
+    let hints = folder.hints();
+    ["--hints".to_owned(), hints.to_string_lossy().into_owned()]
 }
 
 fn of_teachers(chroma: &ChromaReport, add: &mut dyn FnMut(&str, String)) {

@@ -27,18 +27,12 @@ const THUMB: f32 = 120.0;
 pub struct PaintContent {
     run: RunContent,
     session: Arc<PaintSession>,
-    /// Command that colors the run with the strokes, to be copied.
-    command: String,
 }
 
 impl PaintContent {
-    /// The page of a run and of whoever paints on it; `command` is the one that Save runs.
-    pub fn new(run: RunContent, session: Arc<PaintSession>, command: String) -> Self {
-        Self {
-            run,
-            session,
-            command,
-        }
+    /// The page of a run and of whoever paints on it.
+    pub fn new(run: RunContent, session: Arc<PaintSession>) -> Self {
+        Self { run, session }
     }
 
     /// The answer to a request.
@@ -160,10 +154,7 @@ impl Content for PaintContent {
                 "camera": photo.views.start,
             })
         });
-        about["paint"] = json!({
-            "photos": photos.collect::<Vec<_>>(),
-            "command": self.command,
-        });
+        about["paint"] = json!({ "photos": photos.collect::<Vec<_>>() });
         about["scenes"] = json!(["color", "luma"]);
         about["stamps"] = json!({ "color": 0, "luma": 0 });
         Ok(about)

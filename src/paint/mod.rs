@@ -14,6 +14,7 @@ mod pictures;
 mod scene;
 mod session;
 mod strokes;
+mod work;
 
 pub use content::PaintContent;
 pub use session::PaintSession;

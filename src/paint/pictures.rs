@@ -7,7 +7,7 @@ use image::ExtendedColorType;
 use super::{layer::encoded, scene::PaintScene};
 use crate::{
     capture::Original,
-    frames::{Canvas, SceneDrawer, Strokes, blend, finish},
+    frames::{Canvas, SceneDrawer, Strokes, WeightedColors, blend, finish},
     run::RunError,
     splats::ShField,
     store::StoreError,
@@ -33,13 +33,25 @@ pub enum Colors<'a> {
     /// The scene's, joined with the teachers' as in finished frames, strokes over what it leaves
     /// open.
     Scene(&'a ShField),
+    /// The same quickly: as the picture before, but for what the scene's colors have changed by.
+    Guess(&'a ShField),
     /// The scene's alone.
     Plain(&'a ShField),
 }
 
+/// A photo's colors, and the scene's of which they were made.
+struct Joined {
+    photo: usize,
+    seen: WeightedColors,
+    ab: Vec<[f32; 2]>,
+}
+
 /// Pictures of a run's photos.
 #[derive(Default)]
-pub struct Pictures(Mutex<Vec<(usize, Arc<Prepared>)>>);
+pub struct Pictures {
+    prepared: Mutex<Vec<(usize, Arc<Prepared>)>>,
+    last: Mutex<Option<Joined>>,
+}
 
 impl Pictures {
     /// A photo as PNG; none of the teachers' where there is no answer.
@@ -68,14 +80,12 @@ impl Pictures {
                 None => return Ok(None),
             },
             Colors::Plain(chroma) => drawn(chroma)?.ab,
-            Colors::Scene(chroma) => {
+            Colors::Scene(chroma) => self.joined(scene, &prepared, photo, drawn(chroma)?)?,
+            Colors::Guess(chroma) => {
                 let seen = drawn(chroma)?;
-                let ab = blend(canvas, &seen, taught.as_deref(), None);
-                let name = &scene.photos[photo].name;
-                let paint = scene.hint(canvas.query(name), canvas.gray_image())?;
-                match paint.is_empty() {
-                    true => ab,
-                    false => Strokes::of(canvas, &seen, &paint, true).over(canvas, &seen, &ab),
+                match self.changed(photo, &seen) {
+                    Some(ab) => ab,
+                    None => self.joined(scene, &prepared, photo, seen)?,
                 }
             }
         };
@@ -86,8 +96,42 @@ impl Pictures {
         Ok(Some(png.map_err(failed)?))
     }
 
+    /// The scene's colors joined with the teachers', strokes over what they leave open.
+    fn joined(
+        &self,
+        scene: &PaintScene,
+        Prepared { canvas, taught, .. }: &Prepared,
+        photo: usize,
+        seen: WeightedColors,
+    ) -> Result<Vec<[f32; 2]>, RunError> {
+        let mut ab = blend(canvas, &seen, taught.as_deref(), None);
+        let name = &scene.photos[photo].name;
+        let paint = scene.hint(canvas.query(name), canvas.gray_image())?;
+        if !paint.is_empty() {
+            ab = Strokes::of(canvas, &seen, &paint, true).over(canvas, &seen, &ab);
+        }
+        let joined = Joined {
+            photo,
+            seen,
+            ab: ab.clone(),
+        };
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(joined);
+        Ok(ab)
+    }
+
+    /// The last picture's colors with what the scene's have changed by; none of another photo.
+    fn changed(&self, photo: usize, seen: &WeightedColors) -> Option<Vec<[f32; 2]>> {
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let last = last.as_ref().filter(|last| last.photo == photo)?;
+        let changed = (0..seen.ab.len()).map(|i| {
+            let by = |k: usize| seen.weight[i] * (seen.ab[i][k] - last.seen.ab[i][k]);
+            [last.ab[i][0] + by(0), last.ab[i][1] + by(1)]
+        });
+        Some(changed.collect())
+    }
+
     fn prepared(&self, scene: &PaintScene, photo: usize) -> Result<Arc<Prepared>, RunError> {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.prepared.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(place) = kept.iter().position(|(known, _)| *known == photo) {
             let found = kept.remove(place);
             kept.insert(0, found);

@@ -38,9 +38,8 @@ pub struct PaintedPhoto {
     pub name: String,
     /// Its views.
     pub views: Range<usize>,
-    /// From its file's pixels to upright ones, and from those of its views.
+    /// From its file's pixels to upright ones.
     pub of_file: Orientation,
-    pub upright: Orientation,
     /// Width and height of the layer, upright.
     pub size: [u32; 2],
 }
@@ -59,8 +58,8 @@ pub struct PaintScene {
     pub believed: ShField,
     pub exposures: Vec<Exposure>,
     pub teachers: Mutex<Teachers>,
-    /// Words of the command that colors the run with the strokes.
-    pub command: Vec<String>,
+    /// Words of the command that colors the run.
+    command: Vec<String>,
     _lock: RunLock,
 }
 
@@ -121,6 +120,13 @@ impl PaintScene {
                 ..ChromaSettings::irls()
             },
         }
+    }
+
+    /// Words of the command that colors the run, with the strokes in its folder if there are any.
+    pub fn command(&self, painted: bool) -> Vec<String> {
+        let hints = command::hints(&self.folder);
+        let hints = hints.into_iter().filter(|_| painted);
+        self.command.iter().cloned().chain(hints).collect()
     }
 
     /// The run's a and b as they would be with hints but without any: these are not made stronger.
@@ -191,7 +197,6 @@ fn photos(dataset: &Dataset) -> Result<Vec<PaintedPhoto>, RunError> {
             name: first.photo.clone(),
             views: range,
             of_file: first.stance.of_file(),
-            upright: first.stance.upright,
             size: first.stance.upright.size(size),
         })
     });

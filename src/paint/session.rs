@@ -2,7 +2,6 @@
 
 use std::{
     collections::BTreeSet,
-    env,
     path::Path,
     sync::{
         Arc, Condvar, Mutex, MutexGuard, PoisonError,
@@ -22,16 +21,13 @@ use super::{
     strokes::AllStrokes,
 };
 use crate::{
-    chroma::{
-        Repainter, bake_rgb,
-        teacher::{GrayImage, Query},
-    },
-    programs::Program,
+    chroma::bake_rgb,
     run::RunError,
     splats::{ShField, Splats},
     store::StoreError,
     subject::scene::{Frame, read_scene},
-    tell::{Event, Observer},
+    tell::Observer,
+    tradeoff::shell_line,
 };
 
 /// State of the colors.
@@ -64,10 +60,10 @@ pub enum Phase {
 }
 
 /// Colors that are shown, as changes of a splat file's.
-struct Base {
+pub(super) struct Base {
     /// Baked, and the a and b that it was baked from.
-    splats: Splats,
-    chroma: ShField,
+    pub splats: Splats,
+    pub chroma: ShField,
 }
 
 /// Where nobody knows the colors.
@@ -75,30 +71,37 @@ struct Base {
 pub struct Doubt {
     /// a and b that tint the Gaussians.
     pub tint: ShField,
-    /// Photos and upright pixels to paint next.
-    pub places: Vec<(usize, [f32; 2])>,
+    /// Photos to paint next.
+    pub next: Vec<usize>,
 }
 
-struct State {
+pub(super) struct State {
     /// Counts up with every change.
-    version: u64,
+    pub version: u64,
     /// The version that the colors are of.
-    colors: u64,
-    phase: Phase,
-    strokes: AllStrokes,
-    base: Arc<Base>,
-    shown: Arc<ShField>,
+    pub colors: u64,
+    pub phase: Phase,
+    pub strokes: AllStrokes,
+    pub base: Arc<Base>,
+    pub shown: Arc<ShField>,
     /// Photos whose strokes the solver does not know.
-    dirty: BTreeSet<usize>,
-    stroked: Option<Instant>,
-    unsettled: bool,
-    save: bool,
-    saved: bool,
+    pub dirty: BTreeSet<usize>,
+    pub stroked: Option<Instant>,
+    pub unsettled: bool,
+    pub save: bool,
+    pub saved: bool,
     /// Doubt is asked for; what was found, and of which colors.
-    look: bool,
-    doubt: Option<(u64, Arc<Doubt>)>,
+    pub look: bool,
+    pub doubt: Option<(u64, Arc<Doubt>)>,
     /// The photo drawn last in the colors of a version.
-    drawn: Option<(usize, u64, Arc<Vec<u8>>)>,
+    pub drawn: Option<(usize, u64, Arc<Vec<u8>>)>,
+}
+
+impl State {
+    /// Words of the command that colors the run with what is painted now.
+    pub fn command(&self, scene: &PaintScene) -> Vec<String> {
+        scene.command(self.strokes.painted().next().is_some())
+    }
 }
 
 /// A run that is painted on.
@@ -106,17 +109,9 @@ pub struct PaintSession {
     pub scene: PaintScene,
     pictures: Pictures,
     state: Mutex<State>,
-    changed: Condvar,
+    pub(super) changed: Condvar,
     /// Ends a solve for somebody who paints.
-    stop: AtomicBool,
-}
-
-/// Work that comes next.
-enum Step {
-    Preview(Vec<usize>),
-    Solve,
-    Look,
-    Save,
+    pub(super) stop: AtomicBool,
 }
 
 impl PaintSession {
@@ -139,6 +134,8 @@ impl PaintSession {
             true => read_scene(&color, Frame::Own, observe)?.splats,
             false => bake_rgb(&scene.luma, &chroma),
         };
+        let chroma_report = scene.report.chroma.as_ref();
+        let hinted = chroma_report.is_some_and(|chroma| chroma.hints > 0);
         let state = State {
             version: 1,
             colors: 1,
@@ -146,13 +143,14 @@ impl PaintSession {
                 doing: String::new(),
             },
             dirty: strokes.painted().collect(),
-            strokes,
             shown: Arc::new(chroma.clone()),
             base: Arc::new(Base { splats, chroma }),
             stroked: None,
             unsettled: true,
             save: false,
-            saved: true,
+            // Nobody knows whether these strokes are in the run's colors.
+            saved: !hinted && strokes.painted().next().is_none(),
+            strokes,
             look: false,
             doubt: None,
             drawn: None,
@@ -175,12 +173,12 @@ impl PaintSession {
         Ok(session)
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    pub(super) fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Changes the state and lets everybody know.
-    fn change<T>(&self, how: impl FnOnce(&mut State) -> T) -> T {
+    pub(super) fn change<T>(&self, how: impl FnOnce(&mut State) -> T) -> T {
         let mut state = self.state();
         let done = how(&mut state);
         state.version += 1;
@@ -188,7 +186,7 @@ impl PaintSession {
         done
     }
 
-    fn tell(&self, phase: Phase) {
+    pub(super) fn tell(&self, phase: Phase) {
         self.change(|state| state.phase = phase);
     }
 
@@ -254,7 +252,8 @@ impl PaintSession {
             "painted": state.strokes.painted().collect::<Vec<_>>(),
             "palette": state.strokes.log.palette,
             "saved": state.saved,
-            "doubt": doubt.map(|(_, doubt)| &doubt.places),
+            "command": shell_line(&state.command(&self.scene)),
+            "doubt": doubt.map(|(_, doubt)| &doubt.next),
         })
     }
 
@@ -272,6 +271,10 @@ impl PaintSession {
     /// # Errors
     /// [`RunError`] of the photo or the device.
     pub fn now(&self, photo: usize) -> Result<Arc<Vec<u8>>, RunError> {
+        self.drawn(photo, false)
+    }
+
+    pub(super) fn drawn(&self, photo: usize, quickly: bool) -> Result<Arc<Vec<u8>>, RunError> {
         let (version, shown) = {
             let state = self.state();
             match &state.drawn {
@@ -281,9 +284,11 @@ impl PaintSession {
                 _ => (state.colors, state.shown.clone()),
             }
         };
-        let png = self
-            .picture(photo, Colors::Scene(&shown))?
-            .unwrap_or_default();
+        let colors = match quickly {
+            true => Colors::Guess(&shown),
+            false => Colors::Scene(&shown),
+        };
+        let png = self.picture(photo, colors)?.unwrap_or_default();
         let png = Arc::new(png);
         self.state().drawn = Some((photo, version, png.clone()));
         Ok(png)
@@ -348,204 +353,4 @@ impl PaintSession {
         }
         splats
     }
-
-    /// The thread: opens what takes time, then waits for work.
-    fn work(&self) -> Result<(), RunError> {
-        let scene = &self.scene;
-        let tell = &mut |event: Event| {
-            if let Event::Progress {
-                stage, done, total, ..
-            } = event
-            {
-                let doing = format!("{stage} {done} of {total}");
-                self.tell(Phase::Opening { doing });
-            }
-        };
-        let answers = scene.teachers(|teachers| teachers.ask(&scene.dataset, 1, tell))?;
-        let settings = scene.settings();
-        let start = scene.unpainted();
-        let unknown = start.is_none();
-        let supervision = &answers.supervision;
-        let (raster, dataset, luma) = (&scene.raster, &scene.dataset, &scene.luma);
-        let mut repainter = Repainter::new(
-            raster,
-            dataset,
-            luma,
-            supervision,
-            (&settings, PIXELS),
-            start,
-        )?;
-        let doing = "colors".to_owned();
-        self.tell(Phase::Opening { doing });
-        if unknown {
-            repainter.solve(&AtomicBool::new(false), &mut |_| {})?;
-        }
-        loop {
-            match self.next() {
-                Step::Preview(photos) => self.preview(&mut repainter, &photos)?,
-                Step::Solve => self.solve(&mut repainter)?,
-                Step::Look => self.find_doubt(&repainter)?,
-                Step::Save => match self.color_run() {
-                    Ok(chroma) => repainter.rebase(chroma),
-                    Err(error) => self.tell(Phase::Failed {
-                        reason: error.to_string(),
-                    }),
-                },
-            }
-        }
-    }
-
-    /// Waits for work.
-    fn next(&self) -> Step {
-        let mut state = self.state();
-        loop {
-            if !state.dirty.is_empty() {
-                state.unsettled = true;
-                return Step::Preview(std::mem::take(&mut state.dirty).into_iter().collect());
-            }
-            if state.unsettled {
-                self.stop.store(false, Ordering::Relaxed);
-                return Step::Solve;
-            }
-            if std::mem::take(&mut state.save) {
-                return Step::Save;
-            }
-            if std::mem::take(&mut state.look) {
-                return Step::Look;
-            }
-            state = self
-                .changed
-                .wait(state)
-                .unwrap_or_else(PoisonError::into_inner);
-        }
-    }
-
-    /// Shows what the strokes on some photos may come to.
-    fn preview(&self, repainter: &mut Repainter<'_>, photos: &[usize]) -> Result<(), RunError> {
-        let dataset = &self.scene.dataset;
-        for &photo in photos {
-            for view in self.scene.photos[photo].views.clone() {
-                let gray = dataset.photo(view)?;
-                let gray = GrayImage {
-                    width: gray.width,
-                    height: gray.height,
-                    pixels: &gray.gray,
-                };
-                let query = Query::view(&dataset.capture.views[view], &dataset.cameras[view]);
-                let paint = self.scene.hint(query, gray)?;
-                repainter.paint(view, &paint)?;
-            }
-        }
-        self.show(repainter.shown().clone(), Phase::Previewed);
-        // Before the solver takes the device.
-        match photos {
-            [photo] => self.now(*photo).map(drop),
-            _ => Ok(()),
-        }
-    }
-
-    fn show(&self, shown: ShField, phase: Phase) {
-        self.change(|state| {
-            state.colors = state.version + 1;
-            state.shown = Arc::new(shown);
-            state.phase = phase;
-        });
-    }
-
-    /// Solves for the strokes, until somebody paints.
-    fn solve(&self, repainter: &mut Repainter<'_>) -> Result<(), RunError> {
-        // Colors stay the run's until there are strokes.
-        let stroked = {
-            let state = self.state();
-            let any = state.strokes.painted().next().is_some();
-            any.then_some(state.stroked).or(state.stroked.map(Some))
-        };
-        if stroked.is_some() {
-            self.tell(Phase::Solving);
-        }
-        let done = repainter.solve(&self.stop, &mut |shown| {
-            if stroked.is_some() {
-                self.show(shown.clone(), Phase::Solving);
-            }
-        })?;
-        if done.is_none() {
-            return Ok(());
-        }
-        self.change(|state| {
-            if state.dirty.is_empty() {
-                state.unsettled = false;
-            }
-            state.phase = match stroked.flatten() {
-                Some(stroked) => Phase::Settled {
-                    seconds: stroked.elapsed().as_secs_f64(),
-                },
-                None => Phase::Ready,
-            };
-        });
-        Ok(())
-    }
-
-    fn find_doubt(&self, repainter: &Repainter<'_>) -> Result<(), RunError> {
-        let (tint, places) = repainter.doubt(PLACES)?;
-        let photos = &self.scene.photos;
-        let upright = |(view, [x, y]): (usize, [f32; 2])| {
-            let photo = photos
-                .iter()
-                .position(|photo| photo.views.contains(&view))?;
-            let camera = &self.scene.dataset.cameras[view];
-            let size = [camera.width, camera.height];
-            let [width, height] = photos[photo].upright.size(size);
-            let mut marked = vec![false; size[0] as usize * size[1] as usize];
-            *marked.get_mut((y as u32 * size[0] + x as u32) as usize)? = true;
-            let at = photos[photo].upright.turned(marked, 1, size);
-            let at = at.iter().position(|marked| *marked)? as u32;
-            let [w, h] = photos[photo].size;
-            let place = [(at % width, width, w), (at / width, height, h)];
-            Some((
-                photo,
-                place.map(|(at, of, to)| (at as f32 + 0.5) * to as f32 / of as f32),
-            ))
-        };
-        let places = places.into_iter().filter_map(upright).collect();
-        self.change(|state| {
-            state.doubt = Some((state.colors, Arc::new(Doubt { tint, places })));
-        });
-        Ok(())
-    }
-
-    /// Runs the command that the page shows; the colors that it found.
-    fn color_run(&self) -> Result<ShField, RunError> {
-        let program = env::current_exe()
-            .map_err(|error| StoreError::file(self.scene.folder.path(), error.to_string()))?;
-        self.tell(Phase::Saving {
-            doing: String::new(),
-        });
-        let command = Program::new(program).args(&self.scene.command);
-        command.run(Path::new("."), &mut |line| {
-            let doing = line.to_owned();
-            self.tell(Phase::Saving { doing });
-        })?;
-        let (folder, count) = (&self.scene.folder, self.scene.luma.len());
-        let chroma = folder.read_chroma(count)?;
-        let chroma = chroma.ok_or_else(|| StoreError::file(&folder.chroma(), "is missing"))?;
-        let splats = read_scene(&folder.color(), Frame::Own, &mut |_| {})?.splats;
-        let base = Arc::new(Base {
-            splats,
-            chroma: chroma.clone(),
-        });
-        self.change(|state| {
-            state.colors = state.version + 1;
-            state.base = base;
-            state.shown = Arc::new(chroma.clone());
-            state.saved = state.dirty.is_empty();
-            state.phase = Phase::Saved;
-        });
-        Ok(chroma)
-    }
 }
-
-/// Pixels of a photo that colors are solved for while somebody paints, at most.
-const PIXELS: usize = 80_000;
-
-/// Places that are marked to be painted next.
-const PLACES: usize = 3;

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::{
     program::{Place, files_below},
     shared::onnx,
-    view_page::{Page, looked_at, parts},
+    view_page::{Page, looked_at_by, parts},
 };
 
 /// A violet that nothing in the bundled garden has.
@@ -206,16 +206,37 @@ fn the_scene_follows_strokes_which_outlive_a_crash_and_the_run_stays_until_it_is
 
     // Saving is the command that the page shows.
     assert_eq!(easel.post("save", &json!({})), 200);
-    easel.once("saved");
+    let command = easel.once("saved")["command"].clone();
     let apart = mean_delta(&again, &easel.photos());
     assert!(apart < NEAR, "{apart}");
     let saved = place.read("runs/garden/chroma.npy");
-    let command = easel.page.about()["paint"]["command"]
-        .as_str()
-        .expect("a command")
-        .to_owned();
     drop(easel);
+    let command = command.as_str().expect("a command");
     let words: Vec<&str> = command.split(' ').skip(1).collect();
     place.succeed(&words);
     assert!(place.read("runs/garden/chroma.npy") == saved);
+}
+
+/// Colors of a pixel that are plainly others.
+fn differs(a: &Value, b: &Value) -> bool {
+    let rgb = |value: &Value| [0, 1, 2].map(|k| value[k].as_f64().expect("a number"));
+    let lab = |value: &Value| srgb_to_lab(rgb(value).map(|v| v / 255.0));
+    ciede2000(lab(a), lab(b)) > 8.0
+}
+
+#[test]
+#[ignore = "needs Chromium, Node and its packages: make test-all"]
+fn the_mouse_paints_and_the_keys_undo() {
+    let place = garden();
+    let (page, line) = Page::and_line(&place, &["runs/garden", "--paint"]);
+    let url = line.split(' ').next().expect("an address");
+    let found = looked_at_by("paint.mjs", &[url]);
+    assert!(differs(&found["before"], &found["painted"]), "{found}");
+    assert!(!differs(&found["before"], &found["undone"]), "{found}");
+    drop(page);
+    assert!(
+        place
+            .path("runs/garden/paint/hints/garden_02.jpg.png")
+            .is_file()
+    );
 }

@@ -365,13 +365,18 @@ fn strip(value: &mut Value) {
     }
 }
 
-/// Node's script that opens pages.
-const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/viewers/page.mjs");
+/// Node's scripts that open pages.
+const SCRIPTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/viewers");
 
 /// Findings of the browser at a page.
-pub fn looked_at(arguments: &[&str]) -> Value {
+fn looked_at(arguments: &[&str]) -> Value {
+    looked_at_by("page.mjs", arguments)
+}
+
+/// The same by another script.
+pub fn looked_at_by(script: &str, arguments: &[&str]) -> Value {
     let done = Command::new("node")
-        .arg(SCRIPT)
+        .arg(std::path::Path::new(SCRIPTS).join(script))
         .args(arguments)
         .output()
         .expect("node");
