@@ -63,7 +63,7 @@ pub use plan::{ChosenDegree, Degree, LEAST_GAIN};
 pub use progress::{ChromaObserver, ChromaProgress};
 pub use recipe::Recipe;
 pub use relight::relight;
-pub use repaint::Repainter;
+pub(crate) use repaint::Repainter;
 pub use roofline::minimum_words;
 pub use saturation::match_saturation;
 pub use settings::{ChromaSettings, SolverKind};

@@ -219,6 +219,7 @@ impl PaintSession {
     /// Has the strokes on a photo looked at.
     fn wake(&self, state: &mut State, photo: usize) {
         state.dirty.insert(photo);
+        state.phase = Phase::Solving;
         state.stroked = Some(Instant::now());
         state.saved = false;
         self.stop.store(true, Ordering::Relaxed);
