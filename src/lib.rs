@@ -3,7 +3,7 @@
 //! Imports go down only:
 //!
 //! ```text
-//! cli → auto → tradeoff, view → run, prepare → subject → store → tell → eval, frames, viewers, blocks → report, doctor → luma, chroma → effects, measure, trajectory → raster
+//! cli → auto, paint → tradeoff, view → run, prepare → subject → store → tell → eval, frames, viewers, blocks → report, doctor → luma, chroma → effects, measure, trajectory → raster
 //! → capture, splats → gpu, color, sections, download, npy, programs, archive, oracle, compare → disk, hash, input, invocation
 //! ```
 //!
@@ -81,6 +81,8 @@ pub mod luma;
 pub mod measure;
 mod npy;
 mod oracle;
+#[cfg(feature = "cli")]
+mod paint;
 #[cfg(feature = "cli")]
 mod prepare;
 #[cfg(feature = "cli")]

@@ -4,7 +4,7 @@
 /** The error that is shown brightest, in shares of the way from black to white. */
 const BRIGHTEST = 0.25;
 
-/** Moves the wipe while it is dragged; `moved` hears of its place, from 0 to 1. */
+/** Moves the wipe while it is dragged; `moved` hears of its place, from 0 to 1, and the event. */
 export function dragWipe(handle, stage, moved) {
   handle.addEventListener("pointerdown", (event) => {
     handle.setPointerCapture(event.pointerId);
@@ -13,7 +13,7 @@ export function dragWipe(handle, stage, moved) {
   handle.addEventListener("pointermove", (event) => {
     if (!handle.hasPointerCapture(event.pointerId)) return;
     const box = stage.getBoundingClientRect();
-    moved(Math.min(1, Math.max(0, (event.clientX - box.left) / box.width)));
+    moved(Math.min(1, Math.max(0, (event.clientX - box.left) / box.width)), event);
   });
   handle.addEventListener("keydown", (event) => {
     const step = { ArrowLeft: -0.02, ArrowRight: 0.02 }[event.key];

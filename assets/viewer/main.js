@@ -223,7 +223,8 @@ async function measure(k) {
 
 function showStatus() {
   const { count, degree } = scenes.get(main) ?? {};
-  if (count === undefined) return;
+  // Paint mode has a status of its own.
+  if (count === undefined || about.paint) return;
   const facts = [`${count.toLocaleString("en")} Gaussians, degree ${degree}`];
   if (about.live) facts.push(about.live);
   if (photographed !== null) {
@@ -343,6 +344,15 @@ async function begin() {
   reset();
   at("poster").hidden = true;
   if (about.live) follow();
+  if (about.paint) await (await import("./paint.js")).paint({ about, jump, recolor, dragWipe });
+}
+
+/** Shows the scene in other colors: halves as its own. */
+function recolor(colors) {
+  const scene = scenes.get("color");
+  if (colors.length !== scene.colors.length) return load("color").then(redraw);
+  renderer.recolor(scene, colors);
+  redraw();
 }
 
 /** For scripts: `await gsChroma.ready`, then `await gsChroma.picture(k)`. */

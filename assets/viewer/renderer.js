@@ -53,6 +53,13 @@ export class Renderer {
     return uploaded;
   }
 
+  /** Gives the Gaussians of a scene other colors. */
+  recolor(scene, colors) {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, scene.colorsTexture);
+    fill(gl, scene.channels === 1 ? gl.RED : gl.RGB, gl.HALF_FLOAT, colors, scene.channels);
+  }
+
   release(scene) {
     const { gl } = this;
     const { meansTexture, shapesTexture, colorsTexture, footprints, shown, order } = scene;

@@ -20,9 +20,17 @@ impl Orientation {
     }
 
     /// Orientation of a value of EXIF's tag, 1 to 8.
-    pub(super) fn of_tag(value: u16) -> Self {
+    pub(crate) fn of_tag(value: u16) -> Self {
         let known = u8::try_from(value).ok().and_then(Exif::from_exif);
         known.map_or_else(Self::default, Self)
+    }
+
+    /// EXIF block with nothing but its tag; none of the identity.
+    pub(crate) fn exif(self) -> Option<Vec<u8>> {
+        // Big endian, one entry: tag 0x0112, a short.
+        let head = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0";
+        let tag = [self.0.to_exif(), 0, 0, 0, 0, 0, 0];
+        (!self.is_none()).then(|| [&head[..], &tag].concat())
     }
 
     /// True for the identity, which moves no pixel.
@@ -125,6 +133,11 @@ pub struct SensorOrientation {
 }
 
 impl SensorOrientation {
+    /// From the file's pixels to upright ones.
+    pub(crate) fn of_file(self) -> Orientation {
+        self.from_file.then(self.upright)
+    }
+
     /// A photo that COLMAP saw as its file has it, or `turned`.
     pub(super) fn new(orientation: Orientation, turned: bool) -> Self {
         let as_it_is = Orientation::default();

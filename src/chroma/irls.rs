@@ -3,7 +3,10 @@
 //! least squares, whose steps L-BFGS makes longer, over all views and all of it on the
 //! device, where that has room for all Gaussians.
 
-use std::time::Instant;
+use std::{
+    sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
+};
 
 use super::{
     ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, Correction, FrozenViews, Targets,
@@ -70,6 +73,8 @@ pub struct IrlsSolver<'a> {
     ended: bool,
     /// True if the views' corrections are not those of the accepted point.
     corrected: bool,
+    /// Set by somebody who waits for the device: the round ends with [`ChromaError::Cancelled`].
+    stop: Option<&'a AtomicBool>,
 }
 
 impl<'a> IrlsSolver<'a> {
@@ -128,7 +133,34 @@ impl<'a> IrlsSolver<'a> {
             undone: false,
             ended: false,
             corrected: false,
+            stop: None,
         })
+    }
+
+    /// Goes on from a solution of much the same targets, for so many rounds: residuals are doubted
+    /// from the first on, views begin with these corrections, and nothing is anchored.
+    pub(super) fn warm(&mut self, corrections: &[Correction], rounds: usize) {
+        self.plain = false;
+        self.anchored = true;
+        self.done = FREE_ROUNDS;
+        self.settings.rounds = FREE_ROUNDS + rounds;
+        (self.passes.corrections.corrections).write(self.gpu(), corrections);
+    }
+
+    /// Returns true if a round is left.
+    pub(super) fn goes_on(&self) -> bool {
+        self.done < self.settings.rounds && !self.ended
+    }
+
+    /// So many rounds, ended between two views once `stop` is set.
+    pub(super) fn run_within(
+        &mut self,
+        rounds: usize,
+        stop: &'a AtomicBool,
+        observe: &mut ChromaObserver<'_>,
+    ) -> Result<(), ChromaError> {
+        self.stop = Some(stop);
+        self.run_to(self.done + rounds, observe)
     }
 
     fn gpu(&self) -> &'a Gpu {
@@ -325,6 +357,13 @@ impl<'a> IrlsSolver<'a> {
             ..LossSettings::default()
         };
         for task in 0..self.passes.tasks.len() {
+            if let Some(stop) = self.stop {
+                // What is ordered cannot be called back.
+                self.gpu().wait()?;
+                if stop.load(Ordering::Relaxed) {
+                    return Err(ChromaError::Cancelled);
+                }
+            }
             self.passes.draw(task, 0, loss_settings, task, ending)?;
         }
         self.spent += if adjoint { 1.0 } else { DRAWING } * self.passes.tasks.len() as f64;
@@ -334,7 +373,7 @@ impl<'a> IrlsSolver<'a> {
 
 impl Interruptible for IrlsSolver<'_> {
     fn go_on(&mut self, observe: &mut ChromaObserver<'_>) -> Result<bool, ChromaError> {
-        let goes_on = self.done < self.settings.rounds && !self.ended;
+        let goes_on = self.goes_on();
         if goes_on {
             self.run_to(self.done + 1, observe)?;
         }

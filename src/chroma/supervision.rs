@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::{
-    ChromaError, ColorizerError, Targets, Task,
+    ChromaError, ColorizerError, Target, Targets, Task,
     teacher::{AbImage, GrayImage, HintImage, Query, Teacher},
 };
 use crate::{
@@ -108,14 +108,22 @@ impl Supervision {
         }))
     }
 
+    /// Colors that a view's teachers want; `None` where nothing is known.
+    ///
+    /// # Errors
+    /// When the temporary file cannot be read.
+    pub(super) fn taught(&self, view: usize) -> Result<Option<Target>, ChromaError> {
+        let target = self.of_view[view].map(|target| self.targets.read(target, 0));
+        target.transpose()
+    }
+
     /// Wanted picture of a view, with the strokes on it as they were painted; `None`
     /// where neither is known.
     ///
     /// # Errors
     /// When the temporary file cannot be read.
     pub fn shown(&self, view: usize) -> Result<Option<AbImage>, ChromaError> {
-        let target = self.of_view[view].map(|target| self.targets.read(target, 0));
-        let taught = target.transpose()?.map(|target| target.ab());
+        let taught = self.taught(view)?.map(|target| target.ab());
         let Some(paint) = self.paint(view)? else {
             return Ok(taught);
         };

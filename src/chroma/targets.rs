@@ -60,6 +60,21 @@ impl Target {
     }
 }
 
+impl Target {
+    /// The same a/b at another size.
+    pub(super) fn resized(self, size: [u32; 2]) -> Self {
+        if size == self.size {
+            return self;
+        }
+        let (colors, weights) = at_size(&self.ab().ab, self.weights.as_deref(), self.size, size);
+        Self {
+            size,
+            pixels: colors.into_iter().map(pack_ab).collect(),
+            weights,
+        }
+    }
+}
+
 /// Place of a picture: pixels, then weights, as words.
 enum TargetData {
     Memory(Vec<u32>),
@@ -70,6 +85,13 @@ struct Stored {
     size: [u32; 2],
     weighted: bool,
     place: TargetData,
+}
+
+impl Stored {
+    /// Number of words.
+    fn words(&self) -> usize {
+        self.size[0] as usize * self.size[1] as usize * (1 + usize::from(self.weighted))
+    }
 }
 
 /// Wanted pictures of many views at 2^0, 2^1, … times smaller sizes.
@@ -131,7 +153,23 @@ impl Targets {
         wanted: &AbImage,
         weights: Option<&[f32]>,
     ) -> Result<usize, ChromaError> {
-        self.push([wanted.width, wanted.height], &wanted.ab, weights, pack_ab)
+        let size = [wanted.width, wanted.height];
+        self.put(None, size, &wanted.ab, weights, pack_ab)
+    }
+
+    /// Puts other wanted a/b in the place of a target.
+    ///
+    /// # Errors
+    /// When the temporary file cannot be written; the target is lost then.
+    pub fn replace_ab(
+        &mut self,
+        index: usize,
+        wanted: &AbImage,
+        weights: Option<&[f32]>,
+    ) -> Result<(), ChromaError> {
+        let size = [wanted.width, wanted.height];
+        self.put(Some(index), size, &wanted.ab, weights, pack_ab)?;
+        Ok(())
     }
 
     /// The same of sRGB-encoded colors from 0 to 1.
@@ -144,17 +182,20 @@ impl Targets {
         wanted: &[[f32; 3]],
         weights: Option<&[f32]>,
     ) -> Result<usize, ChromaError> {
-        self.push(size, wanted, weights, pack_rgb)
+        self.put(None, size, wanted, weights, pack_rgb)
     }
 
-    fn push<const C: usize>(
+    fn put<const C: usize>(
         &mut self,
+        index: Option<usize>,
         size: [u32; 2],
         wanted: &[[f32; C]],
         weights: Option<&[f32]>,
         pack: impl Fn([f32; C]) -> u32,
     ) -> Result<usize, ChromaError> {
         let mut of_target = Vec::with_capacity(self.scales);
+        let old = index.map(|index| std::mem::take(&mut self.stored[index]));
+        let mut old = old.into_iter().flatten();
         for scale in 0..self.scales {
             let smaller = size.map(|side| (side >> scale).max(1));
             let (colors, weights) = match scale {
@@ -167,15 +208,31 @@ impl Targets {
             of_target.push(Stored {
                 size: smaller,
                 weighted,
-                place: self.place(words)?,
+                place: self.place(words, old.next())?,
             });
         }
-        self.stored.push(of_target);
-        Ok(self.stored.len() - 1)
+        let index = index.unwrap_or(self.stored.len());
+        match self.stored.get_mut(index) {
+            Some(stored) => *stored = of_target,
+            None => self.stored.push(of_target),
+        }
+        Ok(index)
     }
 
-    fn place(&mut self, words: Vec<u32>) -> io::Result<TargetData> {
+    /// Keeps words, where those of `old` were if there is no other room.
+    fn place(&mut self, words: Vec<u32>, old: Option<Stored>) -> io::Result<TargetData> {
         let bytes = 4 * words.len();
+        let hole = match old {
+            Some(Stored {
+                place: TargetData::Memory(held),
+                ..
+            }) => {
+                self.room += 4 * held.len();
+                None
+            }
+            Some(old) => Some(old).filter(|old| old.words() == words.len()),
+            None => None,
+        };
         if bytes <= self.room {
             self.room -= bytes;
             return Ok(TargetData::Memory(words));
@@ -184,7 +241,10 @@ impl Targets {
             Some(file) => file,
             none => none.insert(disk::scratch()?),
         };
-        let at = file.seek(SeekFrom::End(0))?;
+        let at = file.seek(match hole.map(|old| old.place) {
+            Some(TargetData::File(at)) => SeekFrom::Start(at),
+            _ => SeekFrom::End(0),
+        })?;
         disk::step()?;
         file.write_all(bytemuck::cast_slice(&words))?;
         Ok(TargetData::File(at))
@@ -297,6 +357,33 @@ mod tests {
                     let (a, b) = (kept.read(index, scale), spilt.read(index, scale));
                     assert_eq!(a.unwrap(), b.unwrap(), "{index} at scale {scale}");
                 }
+            }
+        }
+        // Other colors take the place of the first ones, and no more room.
+        for bytes in [1 << 20, 0] {
+            let mut targets = filled(bytes);
+            let size = |targets: &Targets| {
+                let file = targets.file.as_ref();
+                (
+                    targets.room,
+                    file.map(|file| file.metadata().unwrap().len()),
+                )
+            };
+            let before = size(&targets);
+            let second = targets.read(1, 0).unwrap();
+            let other = AbImage {
+                ab: vec![[7.0, 8.0]; 15],
+                ..second.ab()
+            };
+            targets.replace_ab(1, &other, Some(&[2.0; 15])).unwrap();
+            assert_eq!(size(&targets), before);
+            let found = targets.read(1, 0).unwrap();
+            assert_eq!((found.ab(), found.weights), (other, Some(vec![2.0; 15])));
+            for index in [0, 2] {
+                assert_eq!(
+                    targets.read(index, 0).unwrap(),
+                    kept.read(index, 0).unwrap()
+                );
             }
         }
         let smaller = kept.read(1, 1).unwrap();

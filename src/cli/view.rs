@@ -11,17 +11,21 @@ use clap::Args;
 
 use super::{CliError, headings::OUTPUT, interrupt, print, progress::Progress};
 use crate::{
+    paint::{PaintContent, PaintSession},
     run::ViewedScene,
     subject::Live,
     tell::Stage,
-    view::{LiveContent, RunContent, Server, answer},
+    view::{LiveContent, Request, Response, RunContent, Server, answer},
 };
 
 /// Show a run or a splat file in the browser, beside its photos.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma view runs/house
-  gs-chroma view house.spz")]
+  gs-chroma view house.spz
+
+Color by hand, with strokes on the photos:
+  gs-chroma view runs/house --paint")]
 pub struct View {
     /// Run folder or splat file [default: newest run under runs/].
     #[arg(value_name = "RUN|FILE")]
@@ -35,6 +39,9 @@ pub struct View {
     /// Print the address and open no browser.
     #[arg(long)]
     no_open: bool,
+    /// Paint strokes on the photos of a run; the scene follows, and Save colors the run with them.
+    #[arg(long)]
+    paint: bool,
 }
 
 impl View {
@@ -44,8 +51,24 @@ impl View {
         let viewed = ViewedScene::open(run, colmap, &mut |event| progress.show(&event))?;
         let name = viewed.name.clone();
         let content = RunContent::new(viewed, &mut |event| progress.show(&event))?;
+        if self.paint {
+            let session = PaintSession::open(run, colmap, &mut |event| progress.show(&event))?;
+            let content = PaintContent::new(content, session);
+            let server = Server::bind(self.port)?.taking();
+            progress.finish();
+            return self.serve(&server, &name, move |request| content.answer(request));
+        }
         let server = Server::bind(self.port)?;
         progress.finish();
+        self.serve(&server, &name, move |request| answer(&content, request))
+    }
+
+    fn serve(
+        &self,
+        server: &Server,
+        name: &str,
+        answer: impl Fn(&Request) -> Response + Send + Sync + 'static,
+    ) -> Result<(), CliError> {
         let url = server.url();
         // Who reads the line may act on it at once.
         interrupt::ends_well();
@@ -53,7 +76,7 @@ impl View {
         if !self.no_open {
             open(&url);
         }
-        server.serve(move |request| answer(&content, request));
+        server.serve(answer);
         Ok(())
     }
 }

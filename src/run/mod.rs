@@ -40,6 +40,7 @@ pub use partition::{PartitionOptions, partition};
 pub use plan::{PlanOptions, PlanReport, plan};
 pub use render::{PathOptions, PathShape, RenderOptions, Rendered, Views, render, render_path};
 pub use seams::{SeamViews, ViewMean};
+pub(crate) use teach::Teachers;
 pub use teach::{TeachOptions, teacher_or_photos};
 pub use teacher_command::TeacherCommand;
 pub use viewed::ViewedScene;

@@ -61,7 +61,7 @@ impl Default for TeachOptions {
 
 impl TeachOptions {
     /// The teachers of a run that is colored, as far as they can be asked again.
-    pub(super) fn of_run(report: &Report) -> Self {
+    pub(crate) fn of_run(report: &Report) -> Self {
         let chroma = report.chroma.as_ref();
         let teachers = chroma.into_iter().flat_map(|chroma| &chroma.teachers);
         Self {
@@ -89,7 +89,7 @@ pub fn teacher_or_photos(teacher: &Path, colmap_dir: &Path) -> PathBuf {
 }
 
 /// The teachers and hints of a command, opened.
-pub(super) struct Teachers {
+pub(crate) struct Teachers {
     teachers: Vec<Member>,
     /// True if the options include settings for networks.
     asked_of_networks: bool,
@@ -108,7 +108,7 @@ struct Member {
 }
 
 /// Combined supervision from teachers and hints.
-pub(super) struct TeacherAnswers {
+pub(crate) struct TeacherAnswers {
     pub supervision: Supervision,
     /// Views that have hints.
     pub hinted: usize,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     commit,
-    entries::{TEACHER, check_links},
+    entries::{PAINT, TEACHER, check_links},
     files,
     fingerprint::hashed,
     lock::{RunLock, finish_what_is_left},
@@ -122,6 +122,26 @@ impl RunFolder {
     /// The teacher's cached answers.
     pub fn teacher(&self) -> PathBuf {
         self.0.join(TEACHER)
+    }
+
+    /// Folder of what was painted on the photos.
+    pub fn paint(&self) -> PathBuf {
+        self.0.join(PAINT)
+    }
+
+    /// The painted strokes, named like the photos.
+    pub fn hints(&self) -> PathBuf {
+        self.paint().join("hints")
+    }
+
+    /// The strokes on a photo.
+    pub fn hint(&self, photo: &str) -> PathBuf {
+        self.hints().join(format!("{photo}.png"))
+    }
+
+    /// Record of what was painted when.
+    pub fn paint_log(&self) -> PathBuf {
+        self.paint().join("log.jsonl")
     }
 
     /// Photo, luma, teacher and color side by side.

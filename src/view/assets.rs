@@ -7,6 +7,12 @@ pub const PAGE: &str = include_str!("../../assets/viewer/index.html");
 /// Style sheet.
 pub const STYLE: &str = include_str!("../../assets/viewer/style.css");
 
+/// Script and style of paint mode, which a page that is sent does not have.
+pub const PAINT: [&str; 2] = [
+    include_str!("../../assets/viewer/paint.js"),
+    include_str!("../../assets/viewer/paint.css"),
+];
+
 /// The modules, each behind those that it imports.
 const MODULES: [&str; 10] = [
     include_str!("../../assets/viewer/scene.js"),

@@ -2,7 +2,7 @@
 //! anybody can open. It draws with the kernel of [`crate::raster`], in WebGL 2.
 
 mod about;
-mod assets;
+pub mod assets;
 mod content;
 mod html;
 mod live;
@@ -10,12 +10,12 @@ mod overview;
 mod packed;
 mod server;
 
-pub use content::{RunContent, answer};
+pub use content::{Content, RunContent, answer};
 pub use html::{is_html, write_html};
 pub use live::LiveContent;
 pub use overview::overview;
 pub use packed::pack;
-pub use server::Server;
+pub use server::{Request, Response, Server};
 
 use crate::{run::RunError, store::StoreError};
 

@@ -1,10 +1,11 @@
-//! A server for one page on this machine: GET and nothing else, a fixed list of places, and
-//! answers to nobody who came by another name.
+//! A server for one page on this machine: a fixed list of places, and answers to nobody who came
+//! by another name. It takes GET, and POST from a page that knows its secret.
 //!
 //! Every connection has a thread, a second to be heard in and an end: who is slow or says
 //! nothing keeps nobody else waiting for long, and nothing but itself.
 
 use std::{
+    hash::{BuildHasher, RandomState},
     io::{self, ErrorKind, Read, Write},
     net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream},
     sync::{
@@ -33,6 +34,12 @@ const EACH_MIB: Duration = Duration::from_secs(1);
 /// Connections at a time; a browser opens six. Others wait until one ends.
 const CONNECTIONS: usize = 512;
 
+/// Bytes that a page may send; a stroke has some thousand.
+const BODY_BYTES: usize = 1 << 20;
+
+/// Header in which a page tells the server's secret.
+const SECRET: &str = "x-secret";
+
 /// Bytes of one write.
 const CHUNK: usize = 256 << 10;
 
@@ -45,6 +52,8 @@ pub struct Request {
     pub path: String,
     /// Entity tag that the browser has cached.
     pub known: Option<String>,
+    /// What a page sends; none where it asks.
+    pub posted: Option<Vec<u8>>,
 }
 
 /// An answer.
@@ -91,7 +100,16 @@ impl Response {
 #[derive(Debug)]
 pub struct Server {
     listener: TcpListener,
+    asked_as: Names,
     address: SocketAddr,
+}
+
+/// Names and secret that a request has to know.
+#[derive(Clone, Debug)]
+struct Names {
+    hosts: Vec<String>,
+    /// In the page's address; without one nothing can be sent.
+    secret: Option<String>,
 }
 
 impl Server {
@@ -107,19 +125,38 @@ impl Server {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port.unwrap_or(0)));
         let listener = listener.map_err(taken)?;
         let address = listener.local_addr().map_err(taken)?;
-        Ok(Self { listener, address })
+        let asked_as = Names {
+            hosts: names(address),
+            secret: None,
+        };
+        Ok(Self {
+            listener,
+            asked_as,
+            address,
+        })
+    }
+
+    /// The same for a page that may send something.
+    pub fn taking(mut self) -> Self {
+        // Hashes by keys that the system draws at random.
+        let random = RandomState::new();
+        let halves = [1, 2].map(|half| format!("{:016x}", random.hash_one(half)));
+        self.asked_as.secret = Some(halves.concat());
+        self
     }
 
     /// URL of the page.
     pub fn url(&self) -> String {
-        format!("http://{}/", self.address)
+        let secret = self.asked_as.secret.as_ref();
+        let secret = secret.map_or(String::new(), |secret| format!("#{secret}"));
+        format!("http://{}/{secret}", self.address)
     }
 
     /// Answers until the program ends.
     pub fn serve(&self, answer: impl Fn(&Request) -> Response + Send + Sync + 'static) {
         let answer = Arc::new(answer);
         let open = Arc::new(AtomicUsize::new(0));
-        let names = names(self.address);
+        let names = self.asked_as.clone();
         for stream in self.listener.incoming() {
             let Ok(stream) = stream else {
                 // Such as no more files: they come back.
@@ -170,12 +207,17 @@ impl Drop for ConnectionSlot {
 
 fn handle(
     mut stream: TcpStream,
-    names: &[String],
+    names: &Names,
     answer: &dyn Fn(&Request) -> Response,
 ) -> io::Result<()> {
-    let head = hear(&mut stream)?;
+    let until = Instant::now() + HEARD_WITHIN;
+    let (head, mut body) = hear(&mut stream, until)?;
     let answered = match understood(&head, names) {
-        Ok(request) => {
+        Ok((mut request, length)) => {
+            if request.posted.is_some() {
+                hear_body(&mut stream, &mut body, length, until)?;
+                request.posted = Some(body);
+            }
             let answered = answer(&request);
             match answered.tag.is_some() && answered.tag == request.known {
                 true => Response {
@@ -191,18 +233,46 @@ fn handle(
     tell(&mut stream, &answered)
 }
 
-/// The head of a request, up to the empty line or to what is too much.
-fn hear(stream: &mut TcpStream) -> io::Result<Vec<u8>> {
-    let until = Instant::now() + HEARD_WITHIN;
+/// The head of a request, up to the empty line or to what is too much, and what came behind it.
+fn hear(stream: &mut TcpStream, until: Instant) -> io::Result<(Vec<u8>, Vec<u8>)> {
     let (mut head, mut part) = (Vec::new(), [0; 2048]);
-    while head.len() < HEAD_BYTES && !head.windows(4).any(|end| end == b"\r\n\r\n") {
-        stream.set_read_timeout(Some(left(until)?))?;
-        match stream.read(&mut part)? {
-            0 => return Err(ErrorKind::UnexpectedEof.into()),
-            read => head.extend(&part[..read]),
+    loop {
+        let end = head.windows(4).position(|end| end == b"\r\n\r\n");
+        if let Some(end) = end {
+            let body = head.split_off(end + 4);
+            return Ok((head, body));
         }
+        if head.len() >= HEAD_BYTES {
+            return Ok((head, Vec::new()));
+        }
+        let read = read(stream, &mut part, until)?;
+        head.extend(&part[..read]);
     }
-    Ok(head)
+}
+
+/// The rest of a body of so many bytes.
+fn hear_body(
+    stream: &mut TcpStream,
+    body: &mut Vec<u8>,
+    length: usize,
+    until: Instant,
+) -> io::Result<()> {
+    let mut part = [0; 1 << 14];
+    while body.len() < length {
+        let read = read(stream, &mut part, until)?;
+        body.extend(&part[..read]);
+    }
+    body.truncate(length);
+    Ok(())
+}
+
+/// Bytes that came, one at least.
+fn read(stream: &mut TcpStream, part: &mut [u8], until: Instant) -> io::Result<usize> {
+    stream.set_read_timeout(Some(left(until)?))?;
+    match stream.read(part)? {
+        0 => Err(ErrorKind::UnexpectedEof.into()),
+        read => Ok(read),
+    }
 }
 
 /// Writes an answer and ends the connection.
@@ -238,9 +308,10 @@ fn left(until: Instant) -> io::Result<Duration> {
     }
 }
 
-/// Parses a head that is GET and came to one of our names: a page of another site that had its name
-/// lead here is refused.
-fn understood(head: &[u8], names: &[String]) -> Result<Request, Response> {
+/// Parses a head that came to one of our names, and the length of what follows: a page of another
+/// site that had its name lead here is refused. What changes anything comes from our page, and knows
+/// its secret.
+fn understood(head: &[u8], names: &Names) -> Result<(Request, usize), Response> {
     let bad = || Response::refused("400 Bad Request", "this is no HTTP request");
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];
     let mut request = httparse::Request::new(&mut headers);
@@ -258,36 +329,71 @@ fn understood(head: &[u8], names: &[String]) -> Result<Request, Response> {
         named.map(|header| header.value).collect()
     };
     let hosts = named("host");
-    let ours = |host: &[u8]| {
-        names
-            .iter()
-            .any(|name| host.eq_ignore_ascii_case(name.as_bytes()))
-    };
+    let ours =
+        |host: &[u8]| (names.hosts.iter()).any(|name| host.eq_ignore_ascii_case(name.as_bytes()));
     if hosts.len() != 1 || !ours(hosts[0]) {
-        let why = format!("this page is at http://{}/ only", names[0]);
+        let why = format!("this page is at http://{}/ only", names.hosts[0]);
         return Err(Response::refused("421 Misdirected Request", why));
     }
-    if request.method != Some("GET") {
-        return Err(Response::refused("405 Method Not Allowed", "GET only"));
-    }
-    let known = named("if-none-match");
-    let known = known.first().and_then(|tag| std::str::from_utf8(tag).ok());
-    Ok(Request {
-        path: request.path.ok_or_else(bad)?.to_owned(),
-        known: known.map(str::to_owned),
-    })
+    let one = |name: &str| match named(name)[..] {
+        [value] => std::str::from_utf8(value).ok(),
+        _ => None,
+    };
+    let posted = match (request.method, &names.secret) {
+        (Some("GET"), _) => None,
+        (Some("POST"), Some(secret)) => {
+            let origin = one("origin").and_then(|origin| origin.strip_prefix("http://"));
+            let own = origin.is_some_and(|origin| ours(origin.as_bytes()));
+            if !own || one(SECRET) != Some(secret) {
+                let why = "open the page at the whole address that the program has printed";
+                return Err(Response::refused("403 Forbidden", why));
+            }
+            Some(Vec::new())
+        }
+        _ => return Err(Response::refused("405 Method Not Allowed", "GET only")),
+    };
+    let length = match (&posted, one("content-length").map(str::parse)) {
+        (None, _) => 0,
+        (Some(_), Some(Ok(length))) if length <= BODY_BYTES => length,
+        (Some(_), Some(_)) => {
+            return Err(Response::refused(
+                "413 Content Too Large",
+                "this is too much",
+            ));
+        }
+        (Some(_), None) => {
+            return Err(Response::refused("411 Length Required", "of what length?"));
+        }
+    };
+    let known = one("if-none-match").map(str::to_owned);
+    let path = request.path.ok_or_else(bad)?.to_owned();
+    Ok((
+        Request {
+            path,
+            known,
+            posted,
+        },
+        length,
+    ))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn asked_as(port: u16, secret: Option<&str>) -> Names {
+        Names {
+            hosts: names((Ipv4Addr::LOCALHOST, port).into()),
+            secret: secret.map(str::to_owned),
+        }
+    }
+
     fn status(head: &str) -> &'static str {
         status_at(4000, head)
     }
 
     fn status_at(port: u16, head: &str) -> &'static str {
-        let refused = understood(head.as_bytes(), &names((Ipv4Addr::LOCALHOST, port).into()));
+        let refused = understood(head.as_bytes(), &asked_as(port, None));
         refused.map_or_else(|refused| refused.status, |_| "200 OK")
     }
 
@@ -325,8 +431,42 @@ mod tests {
     fn what_is_known_is_told() {
         let head =
             "GET /scene.json HTTP/1.1\r\nHost: localhost:4000\r\nIf-None-Match: \"a\"\r\n\r\n";
-        let request = understood(head.as_bytes(), &names(([127, 0, 0, 1], 4000).into())).unwrap();
+        let (request, _) = understood(head.as_bytes(), &asked_as(4000, None)).unwrap();
         assert_eq!(request.path, "/scene.json");
         assert_eq!(request.known.as_deref(), Some("\"a\""));
+    }
+
+    #[test]
+    fn only_a_page_that_knows_the_secret_sends_something() {
+        let status = |headers: &str| {
+            let head = format!("POST /a HTTP/1.1\r\nHost: localhost:4000\r\n{headers}\r\n");
+            let found = understood(head.as_bytes(), &asked_as(4000, Some("abc")));
+            found.map_err(|refused| refused.status)
+        };
+        let own = "Origin: http://127.0.0.1:4000\r\nX-Secret: abc\r\n";
+        let (request, length) = status(&format!("{own}Content-Length: 12\r\n")).unwrap();
+        assert_eq!((request.posted, length), (Some(Vec::new()), 12));
+        for headers in [
+            "",
+            "X-Secret: abc\r\nContent-Length: 2\r\n",
+            "Origin: http://127.0.0.1:4000\r\nContent-Length: 2\r\n",
+            "Origin: http://evil.example\r\nX-Secret: abc\r\nContent-Length: 2\r\n",
+            "Origin: http://127.0.0.1:4001\r\nX-Secret: abc\r\nContent-Length: 2\r\n",
+            "Origin: null\r\nX-Secret: abc\r\nContent-Length: 2\r\n",
+            "Origin: http://127.0.0.1:4000\r\nX-Secret: abd\r\nContent-Length: 2\r\n",
+        ] {
+            assert_eq!(status(headers).unwrap_err(), "403 Forbidden", "{headers}");
+        }
+        let twice = format!("{own}X-Secret: abc\r\nContent-Length: 2\r\n");
+        assert_eq!(status(&twice).unwrap_err(), "403 Forbidden");
+        assert_eq!(status(own).unwrap_err(), "411 Length Required");
+        for length in ["1048577", "99999999999999999999", "-1", "x"] {
+            let head = format!("{own}Content-Length: {length}\r\n");
+            assert_eq!(
+                status(&head).unwrap_err(),
+                "413 Content Too Large",
+                "{length}"
+            );
+        }
     }
 }

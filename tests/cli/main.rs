@@ -34,6 +34,7 @@ mod masks;
 mod names;
 mod package;
 mod pages;
+mod paint;
 mod paths;
 mod photos;
 mod picture;

@@ -18,9 +18,9 @@ use super::{
 };
 
 /// A page that is served, until it is dropped.
-struct Page {
+pub struct Page {
     program: Child,
-    port: u16,
+    pub port: u16,
 }
 
 impl Drop for Page {
@@ -34,16 +34,19 @@ impl Drop for Page {
 impl Page {
     /// `gs-chroma view` with these arguments.
     fn of(place: &Place, arguments: &[&str]) -> Self {
+        Self::and_line(place, arguments).0
+    }
+
+    /// The same with the line that names its address.
+    pub fn and_line(place: &Place, arguments: &[&str]) -> (Self, String) {
         let mut command = place.command(&[&["view", "--no-open"], arguments].concat());
         let spawned = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
         let mut program = spawned.expect("the program starts");
         let mut line = String::new();
         let stdout = program.stdout.take().expect("a pipe");
         BufReader::new(stdout).read_line(&mut line).expect("a line");
-        Self {
-            port: port_in(&line),
-            program,
-        }
+        let port = port_in(&line);
+        (Self { port, program }, line)
     }
 
     fn url(&self) -> String {
@@ -51,7 +54,7 @@ impl Page {
     }
 
     /// Sends bytes and gives all that comes back.
-    fn send(&self, bytes: &[u8]) -> Vec<u8> {
+    pub fn send(&self, bytes: &[u8]) -> Vec<u8> {
         let mut stream = self.connect();
         stream.write_all(bytes).expect("the page listens");
         let mut answer = Vec::new();
@@ -68,12 +71,12 @@ impl Page {
     }
 
     /// The code and the body of a GET.
-    fn get(&self, path: &str) -> (u16, Vec<u8>) {
+    pub fn get(&self, path: &str) -> (u16, Vec<u8>) {
         let host = format!("127.0.0.1:{}", self.port);
         parts(&self.send(format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n").as_bytes()))
     }
 
-    fn about(&self) -> Value {
+    pub fn about(&self) -> Value {
         let (code, body) = self.get("/scene.json");
         assert_eq!(code, 200);
         serde_json::from_slice(&body).expect("JSON")
@@ -89,7 +92,7 @@ fn port_in(line: &str) -> u16 {
     port.unwrap_or_else(|| panic!("names a port: {line}"))
 }
 
-fn parts(answer: &[u8]) -> (u16, Vec<u8>) {
+pub fn parts(answer: &[u8]) -> (u16, Vec<u8>) {
     let end = answer.windows(4).position(|end| end == b"\r\n\r\n");
     let (head, body) = answer.split_at(end.expect("a head") + 4);
     let head = String::from_utf8_lossy(head);
@@ -362,13 +365,18 @@ fn strip(value: &mut Value) {
     }
 }
 
-/// Node's script that opens pages.
-const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/viewers/page.mjs");
+/// Node's scripts that open pages.
+const SCRIPTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/viewers");
 
 /// Findings of the browser at a page.
 fn looked_at(arguments: &[&str]) -> Value {
+    looked_at_by("page.mjs", arguments)
+}
+
+/// The same by another script.
+pub fn looked_at_by(script: &str, arguments: &[&str]) -> Value {
     let done = Command::new("node")
-        .arg(SCRIPT)
+        .arg(std::path::Path::new(SCRIPTS).join(script))
         .args(arguments)
         .output()
         .expect("node");

@@ -9,8 +9,11 @@ mod region;
 mod shade;
 mod spread;
 
+use std::collections::BTreeMap;
+
 use super::{
-    ChromaError, FrozenViews, Supervision, Targets, Task,
+    ChromaError, FrozenViews, Supervision, Target, Targets, Task,
+    frozen::Colors,
     teacher::{AbImage, HintImage},
 };
 use crate::{
@@ -56,7 +59,7 @@ pub(super) struct StrokeTargets {
 }
 
 /// Claim of all strokes together on each Gaussian.
-struct StrokeWeights {
+pub(super) struct StrokeWeights {
     /// Σ α² a, Σ α² b, Σ α² over the photos.
     colors: Vec<[f32; 3]>,
     /// The largest α.
@@ -84,8 +87,21 @@ impl StrokeWeights {
         }
     }
 
+    /// Share of the Gaussians that are claimed by half or more.
+    fn claimed(&self) -> f64 {
+        let claimed = self.alphas.iter().filter(|&&alpha| alpha >= 0.5).count();
+        claimed as f64 / self.alphas.len().max(1) as f64
+    }
+
+    /// Color at the middle lightness and α of the claim on a Gaussian.
+    pub fn of(&self, splat: usize) -> ([f32; 2], f32) {
+        let [a, b, weight] = self.colors[splat];
+        let over = if weight > 0.0 { 1.0 / weight } else { 0.0 };
+        ([over * a, over * b], self.alphas[splat])
+    }
+
     /// Fields that draw α a, α b and α, 1.
-    fn fields(&self) -> [ShField; 2] {
+    pub fn fields(&self) -> [ShField; 2] {
         let one = 1.0 / sh::C0 as f32;
         let mut fields = [(); 2].map(|()| ShField::zeros(self.alphas.len(), 0, 2));
         for (i, (&alpha, &[a, b, weight])) in self.alphas.iter().zip(&self.colors).enumerate() {
@@ -101,30 +117,42 @@ impl StrokeWeights {
     }
 }
 
-/// Lays the strokes of a supervision over what its teachers want, in all views that color learns
-/// from: `frozen` has these and no others, in their order.
-pub(super) fn lay(
-    frozen: &FrozenViews,
-    dataset: &Dataset,
-    supervision: &Supervision,
-    luma: &Splats,
-) -> Result<StrokeTargets, ChromaError> {
-    let cloud = Cloud::of(luma);
-    let mut claims = StrokeWeights::new(luma.len());
-    let mut regions = Targets::new(1);
-    let mut region_of = vec![None; supervision.views.len()];
-    for (view, &i) in supervision.views.iter().enumerate() {
-        let Some(paint) = supervision.paint(i)? else {
-            continue;
-        };
-        let photo = dataset.photo(i)?;
-        let lightness = lightness(&photo);
+/// Claims of strokes, photo by photo.
+pub(super) struct Claims<'a> {
+    cloud: Cloud<'a>,
+    splats: usize,
+    /// Of each painted view of the dataset: its Gaussians, and its pixels' place among the regions.
+    of_view: BTreeMap<usize, (Vec<StrokeWeight>, usize)>,
+    regions: Targets,
+}
+
+impl<'a> Claims<'a> {
+    /// No claims on the Gaussians of `luma`.
+    pub fn new(luma: &'a Splats) -> Self {
+        Self {
+            cloud: Cloud::of(luma),
+            splats: luma.len(),
+            of_view: BTreeMap::new(),
+            regions: Targets::new(1),
+        }
+    }
+
+    /// Takes the paint on view `view` of the dataset, which is `frozen`'s `index`th and shows
+    /// `photo`, in the place of what was painted there.
+    pub fn paint(
+        &mut self,
+        frozen: &FrozenViews,
+        [view, index]: [usize; 2],
+        photo: &Photo,
+        paint: &HintImage,
+    ) -> Result<(), ChromaError> {
+        let lightness = lightness(photo);
         let surface = Surface {
             size: [photo.width, photo.height].map(|side| side as usize),
             lightness: &lightness,
-            depth: &frozen.depth(view)?,
+            depth: &frozen.depth(index)?,
         };
-        let mut region = grow(&surface, &paint);
+        let mut region = grow(&surface, paint);
         if let Some(mask) = &photo.mask {
             for (claim, &counts) in region.iter_mut().zip(mask) {
                 *claim = claim.map(|value| value * f32::from(counts) / 255.0);
@@ -134,7 +162,7 @@ pub(super) fn lay(
             .iter()
             .map(|&[a, b, alpha]| [a, b, alpha, 1.0])
             .collect();
-        claims.add(&cloud.claims(&frozen.gather(view, &figures)?));
+        let claims = self.cloud.claims(&frozen.gather(index, &figures)?);
         let (colors, alphas): (Vec<[f32; 2]>, Vec<f32>) = (region.iter())
             .map(|&[a, b, alpha]| {
                 let over = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
@@ -146,19 +174,38 @@ pub(super) fn lay(
             height: photo.height,
             ab: colors,
         };
-        region_of[view] = Some(regions.push_ab(&colors, Some(&alphas))?);
+        let own = self.of_view.remove(&view).map(|(_, region)| region);
+        let region = match own {
+            Some(region) => {
+                (self.regions).replace_ab(region, &colors, Some(&alphas))?;
+                region
+            }
+            None => self.regions.push_ab(&colors, Some(&alphas))?,
+        };
+        self.of_view.insert(view, (claims, region));
+        Ok(())
     }
-    let claimed = claims.alphas.iter().filter(|&&alpha| alpha >= 0.5).count();
-    let fields = claims.fields();
-    let fields = [frozen.colors(&fields[0])?, frozen.colors(&fields[1])?];
-    let mut targets = Targets::new(supervision.targets.scales());
-    let mut tasks = Vec::new();
-    let mut view = 0;
-    dataset.visit(&supervision.views, |i, photo| {
-        let drawn = frozen.draw(view, &[&fields[0], &fields[1]])?;
-        let mut over = drawn_claims(&drawn);
-        if let Some(region) = region_of[view] {
-            let region = regions.read(region, 0)?;
+
+    /// Claims of all photos on each Gaussian.
+    pub fn weights(&self) -> StrokeWeights {
+        let mut weights = StrokeWeights::new(self.splats);
+        for (claims, _) in self.of_view.values() {
+            weights.add(claims);
+        }
+        weights
+    }
+
+    /// Claims on a view's pixels, drawn of `fields` or painted there: colors at the middle
+    /// lightness, and α.
+    pub fn on(
+        &self,
+        frozen: &FrozenViews,
+        [view, index]: [usize; 2],
+        fields: &[Colors<'_>; 2],
+    ) -> Result<Vec<([f32; 2], f32)>, ChromaError> {
+        let mut over = drawn_claims(&frozen.draw(index, &[&fields[0], &fields[1]])?);
+        if let Some((_, region)) = self.of_view.get(&view) {
+            let region = self.regions.read(*region, 0)?;
             let alphas = region.weights.as_deref().unwrap_or_default();
             for ((own, color), &alpha) in over.iter_mut().zip(region.ab().ab).zip(alphas) {
                 if alpha > own.1 {
@@ -166,17 +213,49 @@ pub(super) fn lay(
                 }
             }
         }
-        if let Some(target) = laid_over(supervision, i, photo, &over, &mut targets)? {
-            tasks.push(Task { view, target });
+        Ok(over)
+    }
+}
+
+/// Lays the strokes of a supervision over what its teachers want, in all views that color learns
+/// from: `frozen` has these and no others, in their order.
+pub(super) fn lay(
+    frozen: &FrozenViews,
+    dataset: &Dataset,
+    supervision: &Supervision,
+    luma: &Splats,
+) -> Result<StrokeTargets, ChromaError> {
+    let mut claims = Claims::new(luma);
+    for (index, &view) in supervision.views.iter().enumerate() {
+        if let Some(paint) = supervision.paint(view)? {
+            let photo = dataset.photo(view)?;
+            claims.paint(frozen, [view, index], &photo, &paint)?;
         }
-        view += 1;
+    }
+    let weights = claims.weights();
+    let fields = weights.fields();
+    let fields = [frozen.colors(&fields[0])?, frozen.colors(&fields[1])?];
+    let mut targets = Targets::new(supervision.targets.scales());
+    let mut tasks = Vec::new();
+    let mut index = 0;
+    dataset.visit(&supervision.views, |view, photo| {
+        let over = claims.on(frozen, [view, index], &fields)?;
+        let taught = supervision.taught(view)?;
+        if let Some((wanted, weights)) = laid_over(taught, photo, &over) {
+            let target = targets.push_ab(&wanted, Some(&weights))?;
+            tasks.push(Task {
+                view: index,
+                target,
+            });
+        }
+        index += 1;
         Ok::<_, ChromaError>(())
     })?;
     dataset.release();
     Ok(StrokeTargets {
         targets,
         tasks,
-        claimed: claimed as f64 / luma.len().max(1) as f64,
+        claimed: weights.claimed(),
     })
 }
 
@@ -188,26 +267,27 @@ fn drawn_claims(drawn: &[RenderedImage]) -> Vec<([f32; 2], f32)> {
             if alpha <= 0.0 {
                 return ([0.0; 2], 0.0);
             }
-            let share = alpha / opacity.max(OPAQUE);
-            let t = ((share - EDGE[0]) / (EDGE[1] - EDGE[0])).clamp(0.0, 1.0);
-            (color.map(|value| value / alpha), t * t * (3.0 - 2.0 * t))
+            let share = whole_or_none(alpha / opacity.max(OPAQUE));
+            (color.map(|value| value / alpha), share)
         })
         .collect()
 }
 
-/// Keeps what is wanted of a view with claims over it; `None` where nothing is.
-fn laid_over(
-    supervision: &Supervision,
-    view: usize,
+/// Share of a claim that counts: see [`EDGE`].
+pub(super) fn whole_or_none(share: f32) -> f32 {
+    let t = ((share - EDGE[0]) / (EDGE[1] - EDGE[0])).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// Colors that a view is to have with claims over its teacher's, all at the photo's size, and the
+/// weight of each pixel; `None` where nothing is wanted.
+pub(super) fn laid_over(
+    taught: Option<Target>,
     photo: &Photo,
     claims: &[([f32; 2], f32)],
-    targets: &mut Targets,
-) -> Result<Option<usize>, ChromaError> {
-    let taught = (supervision.of_view[view])
-        .map(|target| supervision.targets.read(target, 0))
-        .transpose()?;
+) -> Option<(AbImage, Vec<f32>)> {
     if taught.is_none() && claims.iter().all(|&(_, alpha)| alpha == 0.0) {
-        return Ok(None);
+        return None;
     }
     let size = claims.len();
     let mut ab = match &taught {
@@ -241,7 +321,7 @@ fn laid_over(
         height: photo.height,
         ab,
     };
-    targets.push_ab(&wanted, Some(&weights)).map(Some)
+    Some((wanted, weights))
 }
 
 /// `L*` of each pixel.

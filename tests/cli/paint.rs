@@ -1,0 +1,242 @@
+//! `gs-chroma view --paint`: strokes are kept at once, the scene follows, the run stays until it is
+//! saved.
+
+use std::time::{Duration, Instant};
+
+use gs_chroma::color::{ciede2000, srgb_to_lab};
+use serde_json::{Value, json};
+
+use super::{
+    program::{Place, files_below},
+    shared::onnx,
+    view_page::{Page, looked_at_by, parts},
+};
+
+/// A violet that nothing in the bundled garden has.
+const VIOLET: [u8; 3] = [152, 78, 184];
+
+/// Mean ΔE00 over all photos between the colors that settle while painting and those of `colorize`
+/// with the same strokes.
+const NEAR: f64 = 0.5;
+
+/// A quickly colored run of the bundled photos.
+fn garden() -> Place {
+    let place = Place::new();
+    let photos = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
+    let fit = ["fit", photos, "-o", "runs/garden", "--preset", "draft"];
+    let short = ["--iterations", "60", "--max-side", "108"];
+    let few = ["--max-splats", "2500", "--no-fill-gaps"];
+    place.succeed(&[&fit[..], &short, &few].concat());
+    let teacher = onnx("ddcolor_tiny.onnx");
+    place.succeed(&["colorize", "runs/garden", "--teacher", &teacher]);
+    place
+}
+
+/// A page to paint on.
+struct Easel {
+    page: Page,
+    secret: String,
+}
+
+impl Easel {
+    fn of(place: &Place) -> Self {
+        let (page, line) = Page::and_line(place, &["runs/garden", "--paint"]);
+        let secret = line
+            .split('#')
+            .nth(1)
+            .and_then(|rest| rest.split(' ').next());
+        Self {
+            page,
+            secret: secret.expect("a secret in the address").to_owned(),
+        }
+    }
+
+    fn post(&self, what: &str, body: &Value) -> u16 {
+        let host = format!("127.0.0.1:{}", self.page.port);
+        let own = format!("Origin: http://{host}\r\nX-Secret: {}\r\n", self.secret);
+        self.post_with(what, &own, body)
+    }
+
+    fn post_with(&self, what: &str, headers: &str, body: &Value) -> u16 {
+        let (host, body) = (format!("127.0.0.1:{}", self.page.port), body.to_string());
+        let length = body.len();
+        let head = format!(
+            "POST /paint/{what} HTTP/1.1\r\nHost: {host}\r\n{headers}Content-Length: {length}\r\n\r\n"
+        );
+        parts(&self.page.send((head + &body).as_bytes())).0
+    }
+
+    fn news(&self, version: u64) -> Value {
+        let (code, body) = self.page.get(&format!("/paint/news/{version}"));
+        assert_eq!(code, 200);
+        serde_json::from_slice(&body).expect("JSON")
+    }
+
+    /// The news once the colors are in a phase.
+    fn once(&self, phase: &str) -> Value {
+        let (begun, mut version) = (Instant::now(), 0);
+        loop {
+            let news = self.news(version);
+            if news["state"]["phase"] == phase {
+                return news;
+            }
+            assert_ne!(news["state"]["phase"], "failed", "{news}");
+            assert!(begun.elapsed() < Duration::from_secs(120), "{news}");
+            version = news["version"].as_u64().expect("a number");
+        }
+    }
+
+    /// A photo as the page shows it, in CIELAB.
+    fn photo(&self, what: &str, photo: usize) -> Vec<[f64; 3]> {
+        let (code, body) = self.page.get(&format!("/paint/{what}/{photo}"));
+        assert_eq!(code, 200, "{what} {photo}");
+        let picture = image::load_from_memory(&body)
+            .expect("a picture")
+            .into_rgb8();
+        let lab = |rgb: &image::Rgb<u8>| srgb_to_lab(rgb.0.map(|v| f64::from(v) / 255.0));
+        picture.pixels().map(lab).collect()
+    }
+
+    fn photos(&self) -> Vec<Vec<[f64; 3]>> {
+        let about = self.page.about();
+        let count = about["paint"]["photos"].as_array().expect("photos").len();
+        (0..count).map(|k| self.photo("photo", k)).collect()
+    }
+}
+
+/// Across the pumpkin of the third photo, which is 108 × 72.
+fn on_pumpkin(color: Option<[u8; 3]>) -> Value {
+    let points: Vec<[f32; 3]> = (0..12).map(|k| [63.0 + k as f32, 62.0, 1.5]).collect();
+    json!({ "photo": 2, "color": color, "points": points })
+}
+
+/// All files of the run but those of painting.
+fn of_run(place: &Place) -> Vec<(String, Vec<u8>)> {
+    let mut files = files_below(&place.path("runs/garden"));
+    files.retain(|(name, _)| !name.starts_with("paint/"));
+    files
+}
+
+fn mean_delta(a: &[Vec<[f64; 3]>], b: &[Vec<[f64; 3]>]) -> f64 {
+    let pairs = a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b));
+    let deltas: Vec<f64> = pairs.map(|(&a, &b)| ciede2000(a, b)).collect();
+    deltas.iter().sum::<f64>() / deltas.len() as f64
+}
+
+#[test]
+fn the_scene_follows_strokes_which_outlive_a_crash_and_the_run_stays_until_it_is_saved() {
+    let place = garden();
+    let before = of_run(&place);
+    let easel = Easel::of(&place);
+    easel.once("ready");
+    // Only the page may send anything.
+    let host = format!("Origin: http://127.0.0.1:{}\r\n", easel.page.port);
+    let stroke = on_pumpkin(Some(VIOLET));
+    assert_eq!(easel.post_with("stroke", &host, &stroke), 403);
+    let foreign = format!(
+        "Origin: http://evil.example\r\nX-Secret: {}\r\n",
+        easel.secret
+    );
+    assert_eq!(easel.post_with("stroke", &foreign, &stroke), 403);
+    for wrong in [
+        json!({}),
+        json!({ "photo": 99, "color": null, "points": [[1, 1, 1]] }),
+    ] {
+        assert_eq!(easel.post("stroke", &wrong), 400);
+    }
+    assert_eq!(easel.page.get("/paint/photo/99").0, 404);
+    assert_eq!(easel.page.get("/paint/layer/2").0, 404);
+    // Nobody else paints on it meanwhile.
+    let second = place.run(&["view", "runs/garden", "--paint", "--no-open"]);
+    assert_eq!(second.code, Some(1));
+    assert!(second.stderr.contains("process "), "{}", second.stderr);
+
+    let plain = easel.photos();
+    assert_eq!(easel.post("stroke", &stroke), 200);
+    // Before anything is solved.
+    assert!(
+        place
+            .path("runs/garden/paint/hints/garden_02.jpg.png")
+            .is_file()
+    );
+    let settled = easel.once("settled");
+    assert_eq!(settled["painted"], json!([2]));
+    assert_eq!(settled["palette"], json!([VIOLET]));
+    let painted = easel.photos();
+    let pixel = 62 * 108 + 68;
+    let moved = ciede2000(plain[2][pixel], painted[2][pixel]);
+    assert!(moved > 10.0, "{moved}");
+    assert!(mean_delta(&plain, &painted) > 0.2, "other photos follow");
+
+    assert_eq!(easel.post("undo", &json!({})), 200);
+    let undone = easel.news(settled["version"].as_u64().expect("a number"));
+    assert_eq!((&undone["undo"], &undone["redo"]), (&json!(0), &json!(1)));
+    assert!(
+        !place
+            .path("runs/garden/paint/hints/garden_02.jpg.png")
+            .exists()
+    );
+    easel.once("settled");
+    assert!(mean_delta(&plain, &easel.photos()) < NEAR);
+    assert_eq!(easel.post("redo", &json!({})), 200);
+    assert!(of_run(&place) == before, "the run is as it was");
+
+    // It is killed; what was painted is there again.
+    drop(easel);
+    let log = String::from_utf8(place.read("runs/garden/paint/log.jsonl")).expect("text");
+    let acts: Vec<Value> = log
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    let acts: Vec<&str> = acts
+        .iter()
+        .filter_map(|entry| entry["act"].as_str())
+        .collect();
+    assert_eq!(acts, ["paint", "undo", "redo"]);
+    let easel = Easel::of(&place);
+    let ready = easel.once("ready");
+    assert_eq!(ready["painted"], json!([2]));
+    let again = easel.photos();
+    assert!(
+        mean_delta(&painted, &again) < NEAR,
+        "{}",
+        mean_delta(&painted, &again)
+    );
+    assert!(of_run(&place) == before, "the run is as it was");
+
+    // Saving is the command that the page shows.
+    assert_eq!(easel.post("save", &json!({})), 200);
+    let command = easel.once("saved")["command"].clone();
+    let apart = mean_delta(&again, &easel.photos());
+    assert!(apart < NEAR, "{apart}");
+    let saved = place.read("runs/garden/chroma.npy");
+    drop(easel);
+    let command = command.as_str().expect("a command");
+    let words: Vec<&str> = command.split(' ').skip(1).collect();
+    place.succeed(&words);
+    assert!(place.read("runs/garden/chroma.npy") == saved);
+}
+
+/// Colors of a pixel that are plainly others.
+fn differs(a: &Value, b: &Value) -> bool {
+    let rgb = |value: &Value| [0, 1, 2].map(|k| value[k].as_f64().expect("a number"));
+    let lab = |value: &Value| srgb_to_lab(rgb(value).map(|v| v / 255.0));
+    ciede2000(lab(a), lab(b)) > 8.0
+}
+
+#[test]
+#[ignore = "needs Chromium, Node and its packages: make test-all"]
+fn the_mouse_paints_and_the_keys_undo() {
+    let place = garden();
+    let (page, line) = Page::and_line(&place, &["runs/garden", "--paint"]);
+    let url = line.split(' ').next().expect("an address");
+    let found = looked_at_by("paint.mjs", &[url]);
+    assert!(differs(&found["before"], &found["painted"]), "{found}");
+    assert!(!differs(&found["before"], &found["undone"]), "{found}");
+    drop(page);
+    assert!(
+        place
+            .path("runs/garden/paint/hints/garden_02.jpg.png")
+            .is_file()
+    );
+}
