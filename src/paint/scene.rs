@@ -149,6 +149,7 @@ impl PaintScene {
             view: &self.dataset.capture.views[i],
             camera: &self.dataset.cameras[i],
             exposure: self.exposures[i],
+            is_estimated: false,
         };
         self.photos[photo].views.clone().map(of).collect()
     }
@@ -188,6 +189,7 @@ fn photos(dataset: &Dataset) -> Result<Vec<PaintedPhoto>, RunError> {
             view: first,
             camera: &dataset.cameras[range.start],
             exposure: Exposure::NONE,
+            is_estimated: false,
         };
         let size = SceneDrawer::size(&[seen]).unwrap_or_default();
         // As a canvas has it: no larger than the photo.
