@@ -153,6 +153,9 @@ class Scene(unittest.TestCase):
                 if ticks == 30:
                     os.kill(os.getpid(), signal.SIGINT)
 
+        # Shells let what runs in the background ignore it.
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        self.addCleanup(signal.signal, signal.SIGINT, before)
         thread = threading.Thread(target=tick)
         thread.start()
         try:
