@@ -24,7 +24,7 @@ pub enum TeacherError {
     },
     /// The shared library of ONNX Runtime is nowhere.
     #[error(
-        "ONNX Runtime, which runs networks, was not found: {}", how_to(cache.as_deref())
+        "ONNX Runtime was not found: {}", how_to(cache.as_deref())
     )]
     NoRuntime {
         /// The project's folder for it; none where the system names no place for caches.
