@@ -80,7 +80,7 @@ pub use orientation::{Orientation, SensorOrientation};
 pub use original::Original;
 pub use photo::Photo;
 pub use resample::downscale;
-pub use source::{is_capture, originals, photo_folder};
+pub use source::{IMAGES, is_capture, originals, photo_folder};
 pub use split::{Split, split, split_as};
 use transforms::Source;
 pub use unplaced::Unplaced;
@@ -93,9 +93,6 @@ pub(crate) use {
     plain::{Piece, plain_photo, plain_values},
     sample::{Depth, Header},
 };
-
-/// Folder of the photos in a COLMAP folder.
-pub const IMAGES: &str = "images";
 
 /// A quaternion's length may be off by so much: text files round its digits.
 /// Beyond it the pose is no rotation that anyone meant.
@@ -328,9 +325,13 @@ impl Capture {
     /// Paths of all photos below [`Self::photos`], also of those without a pose.
     pub fn all_photos(&self) -> Vec<String> {
         match source::lists_photos(&self.root) {
-            true => first_views(&self.views)
-                .map(|view| view.photo.clone())
-                .collect(),
+            true => {
+                // All views of a photo are neighbors.
+                let mut photos: Vec<String> =
+                    (self.views.iter()).map(|view| view.photo.clone()).collect();
+                photos.dedup();
+                photos
+            }
             false => photos_in(&self.photos),
         }
     }

@@ -7,11 +7,14 @@ use std::{
 };
 
 use super::{
-    Chosen, IMAGES, colmap,
+    Chosen, colmap,
     error::CaptureError,
     transforms::{self, Scene, Source},
 };
 use crate::input;
+
+/// Folder of the photos in a COLMAP folder.
+pub const IMAGES: &str = "images";
 
 /// Folders of photos, the largest first; nerfstudio and others put smaller copies beside them.
 const PHOTOS: [&str; 4] = [IMAGES, "images_2", "images_4", "images_8"];

@@ -32,12 +32,6 @@ const SWEEPS: usize = 24;
 const HELD: usize = 8;
 const SETTLED: f32 = 1e-3;
 
-/// Weight of smoothness relative to data, both in units of local contrast.
-const SMOOTHNESS: f32 = 0.12;
-
-/// Below this, penalties are quadratic: of data, in local contrasts, and of slopes, in pixels.
-const ROUNDED: [f32; 2] = [0.05, 0.05];
-
 /// The flow from one picture to another of the same size, known everywhere. Gray is in 8-bit
 /// levels, `[height, width]`.
 ///

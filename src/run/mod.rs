@@ -95,7 +95,7 @@ pub enum RunError {
     Command(String),
     /// The program that colors photos has written no such picture.
     #[error("{program}: {picture}: {reason}")]
-    TeacherCommand {
+    NoPicture {
         /// The program, as it was started.
         program: String,
         /// Name of the picture.

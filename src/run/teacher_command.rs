@@ -140,7 +140,7 @@ impl TeacherCommand {
             Err(reason) => reason,
         };
         let (program, picture) = (self.words[0].clone(), name.clone());
-        Err(RunError::TeacherCommand {
+        Err(RunError::NoPicture {
             program,
             picture,
             reason,

@@ -267,13 +267,16 @@ impl TeacherError {
     }
 }
 
+/// Option of pip: the library needs none of what the package does.
+const ALONE: &str = "--no-deps";
+
 /// The line that installs ONNX Runtime's library, which its Python package has on all systems.
 fn how_to(cache: Option<&Path>) -> String {
     let python = if cfg!(windows) { "py" } else { "python3" };
     let other = "let ORT_DYLIB_PATH name the shared library of a release of 1.17 or newer (https://github.com/microsoft/onnxruntime/releases)";
     match cache {
         Some(cache) => format!(
-            "{python} -m pip install --no-deps --target \"{}\" onnxruntime; or {other}",
+            "{python} -m pip install {ALONE} -t \"{}\" onnxruntime; or {other}",
             cache.display()
         ),
         None => other.to_owned(),

@@ -1,7 +1,11 @@
 //! Successive over-relaxation of a flow, in the order of a checkerboard: pixels of one color have
 //! neighbors of the other only, so that whole rows are solved at once.
 
-use super::{ROUNDED, SMOOTHNESS};
+/// Weight of smoothness relative to data, both in units of local contrast.
+const SMOOTHNESS: f32 = 0.12;
+
+/// Below this, penalties are quadratic: of data, in local contrasts, and of slopes, in pixels.
+const ROUNDED: [f32; 2] = [0.05, 0.05];
 
 /// Successive over-relaxation.
 const OVER: f32 = 1.7;
