@@ -229,9 +229,11 @@ fn transforms_and_their_points() {
         "{{\"w\":64,\"h\":48,\"fl_x\":60.5,\"k1\":0.01,\"ply_file_path\":\"points.ply\",\"frames\":[{}]}}",
         frames.join(",")
     );
-    let ply = b"ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty double x\nproperty float y\nproperty float z\nproperty uchar red\nend_header\n0123456789abcdefg0123456789abcdefg";
+    let ply = b"ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty double x\nproperty float y\nproperty float z\nproperty uchar red\nend_header\n";
+    // Two at the origin.
+    let ply = [&ply[..], &[0; 34]].concat();
     let paths = ["transforms.json", "points.ply"].map(|name| place.path().join(name));
-    for (path, file) in paths.iter().zip([json.as_bytes(), ply]) {
+    for (path, file) in paths.iter().zip([json.as_bytes(), &ply]) {
         fs::write(path, file).expect("writable");
     }
     for path in paths {
