@@ -140,7 +140,14 @@ impl Pictures {
         let seen = scene.views(photo);
         let range = scene.dataset.options.normalize;
         let original = scene.dataset.loader().original(seen[0].view, range)?;
-        let canvas = Canvas::sized(&original, SceneDrawer::size(&seen).unwrap_or_default());
+        let size = SceneDrawer::size(&seen).unwrap_or_default();
+        let mut canvas = Canvas::sized(&original, size);
+        let trained = scene.dataset.photo(scene.photos[photo].views.start)?;
+        let trained_size = [trained.width, trained.height];
+        if seen[0].view.undistortion.is_none() && trained_size == [canvas.width, canvas.height] {
+            // To the very photo that was trained on the teachers' answers are kept.
+            canvas.gray.clone_from(&trained.gray);
+        }
         let taught = scene.teachers(|teachers| {
             teachers.color(canvas.query(&scene.photos[photo].name), canvas.gray_image())
         })?;

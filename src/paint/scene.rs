@@ -134,13 +134,14 @@ impl PaintScene {
     pub fn unpainted(&self) -> Option<ShField> {
         let of_run = self.report.chroma.as_ref();
         let of_run = of_run.filter(|chroma| chroma.hints == 0)?;
-        let mut chroma = self.chroma.clone()?;
-        let weaker = 1.0 / of_run.saturation as f32;
-        chroma
-            .coefficients
-            .iter_mut()
-            .for_each(|value| *value *= weaker);
-        Some(chroma)
+        Some(scaled(self.chroma.clone()?, 1.0 / of_run.saturation))
+    }
+
+    /// Colors as `colorize` would have them: without strokes as strong as the teachers'.
+    pub fn finished(&self, chroma: ShField, painted: bool) -> ShField {
+        let of_run = self.report.chroma.as_ref().filter(|_| !painted);
+        let factor = of_run.map_or(1.0, |chroma| chroma.saturation);
+        scaled(chroma, factor)
     }
 
     /// Views of a photo.
@@ -174,6 +175,11 @@ impl PaintScene {
     pub fn teachers<T>(&self, ask: impl FnOnce(&mut Teachers) -> T) -> T {
         ask(&mut self.teachers.lock().unwrap_or_else(PoisonError::into_inner))
     }
+}
+
+fn scaled(mut chroma: ShField, factor: f64) -> ShField {
+    (chroma.coefficients.iter_mut()).for_each(|value| *value *= factor as f32);
+    chroma
 }
 
 /// The photos of a dataset, in the order of its views.

@@ -136,7 +136,8 @@ impl PaintSession {
     fn show(&self, shown: ShField, phase: Phase) {
         self.change(|state| {
             state.colors = state.version + 1;
-            state.shown = Arc::new(shown);
+            let painted = state.strokes.painted().next().is_some();
+            state.shown = Arc::new(self.scene.finished(shown, painted));
             state.phase = phase;
         });
     }
