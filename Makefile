@@ -33,8 +33,8 @@ TEST_THREADS = $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 2)))
 test test-all: export MESA_SHADER_CACHE_DIR := $(CURDIR)/target/mesa
 test test-all: export RUST_TEST_THREADS := $(TEST_THREADS)
 test: setup lint
-	cargo test
 	@python3 tools/test_python.py
+	cargo test
 
 # A missing program fails a test here. `PYTHON` has OpenUSD.
 test-all: export PYTHON := $(CURDIR)/target/test-all/bin/python
