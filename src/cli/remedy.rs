@@ -229,6 +229,11 @@ fn of_teacher(error: &TeacherError) -> String {
         TeacherError::NotFetched { name } => {
             format!("{error}: get it with `gs-chroma teacher fetch {name}`")
         }
+        TeacherError::NoRuntime { cache: Some(cache) } => format!(
+            "{error}; in one line: {} -m pip install --no-deps --target \"{}\" onnxruntime",
+            if cfg!(windows) { "py" } else { "python3" },
+            cache.display()
+        ),
         TeacherError::NoDevice { .. } => format!(
             "{error}: choose another --teacher-device, or let ORT_DYLIB_PATH name a library that has it"
         ),

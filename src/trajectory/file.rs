@@ -134,6 +134,8 @@ struct Lens {
 struct Transforms {
     #[serde(flatten)]
     lens: Lens,
+    /// What brought COLMAP's world to the file's.
+    applied_transform: Option<Vec<[f64; 4]>>,
     frames: Vec<TransformsFrame>,
 }
 
@@ -327,6 +329,14 @@ impl Nerfstudio {
 
 impl Transforms {
     fn cameras(&self) -> Result<Vec<Camera>, String> {
+        let applied = self.applied_transform.clone();
+        let applied = applied.map(|transform| WorldTransform {
+            transform,
+            scale: 1.0,
+        });
+        if applied.as_ref().is_some_and(|applied| !applied.is_sound()) {
+            return Err("applied_transform is no rotation and translation".to_owned());
+        }
         numbered(&self.frames, "frames", |frame| {
             let own = frame.lens.or(self.lens);
             let width = side(own.w.unwrap_or(f64::NAN), "w")?;
@@ -343,8 +353,12 @@ impl Transforms {
                 fy: fl_x,
                 ..lens([width, height], 60.0)
             };
-            posed(&own.over(lens), "transform_matrix", |r, c| {
+            let camera = posed(&own.over(lens), "transform_matrix", |r, c| {
                 frame.transform_matrix[r][c]
+            })?;
+            Ok(match &applied {
+                Some(applied) => applied.back(&camera),
+                None => camera,
             })
         })
     }

@@ -95,7 +95,7 @@ fn other_programs_files() {
     let [x, y, z] = [0, 1, 2].map(|r| cameras()[1].rotation.row(r));
     let at = cameras()[1].center();
     let gl = |r: usize| [x[r], -y[r], -z[r], at[r]];
-    let transforms = serde_json::json!({
+    let mut transforms = serde_json::json!({
         "w": 40, "h": 30, "fl_x": 50, "cx": 21.5, "cy": 15,
         "frames": [{"file_path": "a", "transform_matrix": [gl(0), gl(1), gl(2), [0, 0, 0, 1]]}],
     });
@@ -104,7 +104,23 @@ fn other_programs_files() {
         "rotation": [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]],
     }]);
     let one = &cameras()[1..2];
-    assert!(same(&parse(transforms, [1, 1]).unwrap().cameras, one));
+    assert!(same(
+        &parse(transforms.clone(), [1, 1]).unwrap().cameras,
+        one
+    ));
+    // The same after nerfstudio has turned the world.
+    let turned = [gl(0), gl(2), gl(1).map(|v| -v)];
+    transforms["frames"][0]["transform_matrix"] =
+        serde_json::json!([turned[0], turned[1], turned[2], [0, 0, 0, 1]]);
+    let applied = serde_json::json!([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0]]);
+    transforms["applied_transform"] = applied;
+    assert!(same(
+        &parse(transforms.clone(), [1, 1]).unwrap().cameras,
+        one
+    ));
+    transforms["applied_transform"][0][0] = 2.into();
+    let error = parse(transforms, [1, 1]).unwrap_err();
+    assert!(error.contains("applied_transform"), "{error}");
     let centered = [Camera {
         cx: 20.0,
         ..one[0].clone()

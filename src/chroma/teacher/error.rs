@@ -24,7 +24,9 @@ pub enum TeacherError {
     },
     /// The shared library of ONNX Runtime is nowhere.
     #[error(
-        "ONNX Runtime was not found: {}", how_to(cache.as_deref())
+        "ONNX Runtime was not found: put its shared library, 1.17 or newer (lib/ in a release from \
+         https://github.com/microsoft/onnxruntime/releases, or onnxruntime/capi/ in the Python \
+         package) {}", where_to(cache.as_deref())
     )]
     NoRuntime {
         /// The project's folder for it; none where the system names no place for caches.
@@ -267,19 +269,11 @@ impl TeacherError {
     }
 }
 
-/// Option of pip: the library needs none of what the package does.
-const ALONE: &str = "--no-deps";
-
-/// The line that installs ONNX Runtime's library, which its Python package has on all systems.
-fn how_to(cache: Option<&Path>) -> String {
-    let python = if cfg!(windows) { "py" } else { "python3" };
-    let other = "let ORT_DYLIB_PATH name the shared library of a release of 1.17 or newer (https://github.com/microsoft/onnxruntime/releases)";
+/// Advice on the folder for ONNX Runtime's library.
+fn where_to(cache: Option<&Path>) -> String {
     match cache {
-        Some(cache) => format!(
-            "{python} -m pip install {ALONE} -t \"{}\" onnxruntime; or {other}",
-            cache.display()
-        ),
-        None => other.to_owned(),
+        Some(cache) => format!("into {}, or let ORT_DYLIB_PATH name it", cache.display()),
+        None => "anywhere, and let ORT_DYLIB_PATH name it".to_owned(),
     }
 }
 

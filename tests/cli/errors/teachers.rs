@@ -217,7 +217,7 @@ pub(super) const CASES: &[Case] = &[
             "ONNX Runtime nowhere",
             nothing,
             COLORIZE,
-            &["ONNX Runtime", "was not found", "ORT_DYLIB_PATH"],
+            &["ONNX Runtime was not found", "ORT_DYLIB_PATH"],
         )
     },
 ];
