@@ -5,7 +5,8 @@ use super::Canvas;
 /// Reach of the search in pixels of the canvas, to each side: gate weave.
 const REACH: isize = 8;
 
-/// Steps in pixels of the search, from the coarsest; as many apart are the pixels compared.
+/// Steps in pixels of the search, from the coarsest. The pixels compared are as many apart, or
+/// two: more tell nothing new.
 const STEPS: [isize; 3] = [4, 2, 1];
 
 /// Difference in 8-bit levels beyond which a pixel is of something else.
@@ -40,7 +41,7 @@ impl Alignment {
                     shift,
                     lighter: 0.0,
                 };
-                found.compared(drawn, canvas, step as usize)
+                found.compared(drawn, canvas, step.max(2) as usize)
             });
             let least = tried.min_by(|(_, a), (_, b)| a.total_cmp(b));
             best = least.map_or(best, |(found, _)| found);

@@ -1,7 +1,6 @@
 //! The thread that recolors the scene.
 
 use std::{
-    env,
     path::Path,
     sync::{
         Arc, PoisonError,
@@ -15,6 +14,7 @@ use crate::{
         Repainter,
         teacher::{GrayImage, Query},
     },
+    invocation::Invocation,
     programs::Program,
     run::RunError,
     splats::ShField,
@@ -193,13 +193,16 @@ impl PaintSession {
 
     /// Runs the command that the page shows; the colors that it found.
     fn color_run(&self) -> Result<ShField, RunError> {
-        let program = env::current_exe()
-            .map_err(|error| StoreError::file(self.scene.folder.path(), error.to_string()))?;
+        // In Python's process the program is started by Python.
+        let [program, before @ ..] = &*Invocation::present().command else {
+            let reason = "the program's own file is not known";
+            return Err(StoreError::file(self.scene.folder.path(), reason).into());
+        };
         self.tell(Phase::Saving {
             doing: String::new(),
         });
         let words = self.state().command(&self.scene);
-        let command = Program::new(program).args(words);
+        let command = Program::new(program).args(before).args(words);
         command.run(Path::new("."), &mut |line| {
             let doing = line.to_owned();
             self.tell(Phase::Saving { doing });

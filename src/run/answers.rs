@@ -80,6 +80,22 @@ pub(super) fn with_hints(answer: Option<AbImage>, hints: &HintImage) -> ViewTarg
     }
 }
 
+/// Returns true if an image has no color.
+pub(super) fn is_gray(answer: &AbImage) -> bool {
+    let gray = |ab: &[f32; 2]| ab.iter().all(|value| value.abs() < GRAY);
+    answer.ab.iter().all(gray)
+}
+
+/// True if a picture has a single color, gray or another.
+pub(super) fn is_plain(answer: &AbImage) -> bool {
+    let first = answer.ab.first().copied().unwrap_or_default();
+    let near = |ab: &[f32; 2]| (0..2).all(|c| (ab[c] - first[c]).abs() < GRAY);
+    answer.ab.iter().all(near)
+}
+
+/// Sizes of a and b, in CIELAB units, that no picture in color stays below.
+const GRAY: f32 = 1.0;
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     RunError,
-    answers::{mean, scaled, with_hints, with_strokes},
+    answers::{is_gray, is_plain, mean, scaled, with_hints, with_strokes},
 };
 use crate::{
     capture::{Capture, Dataset, FRAMES, photo_folder, photos_in},
@@ -484,19 +484,3 @@ fn gray_images(
         path.display()
     )))
 }
-
-/// Returns true if an image has no color.
-fn is_gray(answer: &AbImage) -> bool {
-    let gray = |ab: &[f32; 2]| ab.iter().all(|value| value.abs() < GRAY);
-    answer.ab.iter().all(gray)
-}
-
-/// True if a picture has a single color, gray or another.
-fn is_plain(answer: &AbImage) -> bool {
-    let first = answer.ab.first().copied().unwrap_or_default();
-    let near = |ab: &[f32; 2]| (0..2).all(|c| (ab[c] - first[c]).abs() < GRAY);
-    answer.ab.iter().all(near)
-}
-
-/// Sizes of a and b, in CIELAB units, that no picture in color stays below.
-const GRAY: f32 = 1.0;

@@ -28,8 +28,8 @@ pub struct TeacherCommand {
     names: [&'static str; 2],
 }
 
-/// A photo that is to be colored: the name of its image, PNG, width and height.
-type Picture = (String, Vec<u8>, [u32; 2]);
+/// A photo that is to be colored: the name of its image, width and height.
+type Picture = (String, [u32; 2]);
 
 impl TeacherCommand {
     /// Splits words as a shell does, which is not asked itself: nothing but quotes and backslashes
@@ -64,25 +64,22 @@ impl TeacherCommand {
         observe: &mut Observer<'_>,
     ) -> Result<PathBuf, RunError> {
         files::make_folder(place)?;
-        let mut pictures = pictures(dataset)?;
-        let folder = place.join(format!("command-{}", &self.key(&pictures)[..16]));
+        let draft = disk::create_folder("command-", place).map_err(files::at(place))?;
+        let [from, to] = ["in", "out"].map(|name| draft.path().join(name));
+        let (mut pictures, key) = self.pictures(dataset, &from)?;
+        let folder = place.join(format!("command-{}", &key[..16]));
         let whole = self.names == ALL;
-        let missing = |(name, ..): &Picture| !folder.join(name).is_file();
+        let missing = |(name, _): &Picture| !folder.join(name).is_file();
         match whole {
             true if !pictures.iter().any(missing) => pictures.clear(),
             true => {}
             false => pictures.retain(missing),
         }
-        let draft = disk::create_folder("command-", place).map_err(files::at(place))?;
-        let [from, to] = ["in", "out"].map(|name| draft.path().join(name));
         let total = pictures.len();
         for (done, picture) in pictures.iter().enumerate() {
-            let (name, png, _) = picture;
+            let (name, _) = picture;
             let [gray, colored] = [from.join(name), to.join(name)];
-            for path in [&gray, &colored] {
-                files::make_folder_of(path)?;
-            }
-            files::write(&gray, png)?;
+            files::make_folder_of(&colored)?;
             if whole {
                 continue;
             }
@@ -121,7 +118,7 @@ impl TeacherCommand {
     }
 
     /// Checks that the program has written a picture of a photo.
-    fn check(&self, path: &Path, (name, _, photo): &Picture) -> Result<(), RunError> {
+    fn check(&self, path: &Path, (name, photo): &Picture) -> Result<(), RunError> {
         let size = match path.is_file() {
             true => ImageReader::open(path)
                 .and_then(ImageReader::with_guessed_format)
@@ -147,54 +144,60 @@ impl TeacherCommand {
         })
     }
 
-    /// SHA-256 of what determines the colors.
-    fn key(&self, pictures: &[Picture]) -> String {
+    /// Writes all photos with a pose into a folder: gray, upright, as PNG of 8 bits, no larger than
+    /// training takes them. Gives them with the SHA-256 of what determines their colors.
+    fn pictures(
+        &self,
+        dataset: &Dataset,
+        folder: &Path,
+    ) -> Result<(Vec<Picture>, String), RunError> {
         let mut hasher = Hasher::default();
         for word in &self.words {
             hasher.update(format!("{word}\n").as_bytes());
             // What cannot be read is as good as not there.
             let _ = input::open(Path::new(word)).and_then(|file| hasher.update_with(file));
         }
-        for (name, png, _) in pictures {
-            hasher.update(name.as_bytes());
-            hasher.update(png);
-        }
-        hasher.finish()
+        let views: Vec<&View> = first_views(&dataset.capture.views).collect();
+        let (loader, range) = (dataset.loader(), dataset.options.normalize);
+        let mut pictures = Vec::with_capacity(views.len());
+        in_order(
+            &views,
+            |view| loader.original(view, range),
+            |view, original: Result<Original, CaptureError>| {
+                let (image, size) = upright(dataset, &original?);
+                let mut png = std::io::Cursor::new(Vec::new());
+                image
+                    .write_to(&mut png, ImageFormat::Png)
+                    .map_err(|error| StoreError::file(&view.image_path, error.to_string()))?;
+                let name = format!("{}.png", view.photo);
+                hasher.update(name.as_bytes());
+                hasher.update(png.get_ref());
+                let path = folder.join(&name);
+                files::make_folder_of(&path)?;
+                files::write(&path, png.get_ref())?;
+                pictures.push((name, size));
+                Ok::<_, RunError>(())
+            },
+        )?;
+        Ok((pictures, hasher.finish()))
     }
 }
 
-/// All photos with a pose in gray, upright, as PNG of 8 bits, no larger than training takes them.
-fn pictures(dataset: &Dataset) -> Result<Vec<Picture>, RunError> {
-    let views: Vec<&View> = first_views(&dataset.capture.views).collect();
-    let (loader, range) = (dataset.loader(), dataset.options.normalize);
-    let mut pictures = Vec::with_capacity(views.len());
-    in_order(
-        &views,
-        |view| loader.original(view, range),
-        |view, original: Result<Original, CaptureError>| {
-            let original = original?;
-            let size = [original.width, original.height];
-            let longer = size[0].max(size[1]);
-            let most = dataset.options.max_side.unwrap_or(longer).min(longer);
-            let scale = f64::from(most) / f64::from(longer);
-            let size = size.map(|side| ((f64::from(side) * scale).round() as u32).max(1));
-            let upright = original.stance.upright;
-            // Of a folder's image only its sides tell that it stands.
-            let upright = Some(upright)
-                .filter(|way| way.size(size) != size)
-                .unwrap_or_default();
-            let gray = upright.turned(original.shrunk(size), 1, size);
-            let size = upright.size(size);
-            let name = format!("{}.png", view.photo);
-            let mut png = std::io::Cursor::new(Vec::new());
-            // Pixels fill their size.
-            let image = GrayImage::from_raw(size[0], size[1], gray).unwrap_or_default();
-            image
-                .write_to(&mut png, ImageFormat::Png)
-                .map_err(|error| StoreError::file(&view.image_path, error.to_string()))?;
-            pictures.push((name, png.into_inner(), size));
-            Ok::<_, RunError>(())
-        },
-    )?;
-    Ok(pictures)
+/// A photo in gray, with its width and height.
+fn upright(dataset: &Dataset, original: &Original) -> (GrayImage, [u32; 2]) {
+    let size = [original.width, original.height];
+    let longer = size[0].max(size[1]);
+    let most = dataset.options.max_side.unwrap_or(longer).min(longer);
+    let scale = f64::from(most) / f64::from(longer);
+    let size = size.map(|side| ((f64::from(side) * scale).round() as u32).max(1));
+    let upright = original.stance.upright;
+    // Of a folder's image only its sides tell that it stands.
+    let upright = Some(upright)
+        .filter(|way| way.size(size) != size)
+        .unwrap_or_default();
+    let gray = upright.turned(original.shrunk(size), 1, size);
+    let size = upright.size(size);
+    // Pixels fill their size.
+    let image = GrayImage::from_raw(size[0], size[1], gray).unwrap_or_default();
+    (image, size)
 }

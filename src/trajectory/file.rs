@@ -23,6 +23,7 @@ use serde_json::Value;
 use super::{
     lens,
     supersplat::{self, typed},
+    world::{SKEW, WorldTransform},
 };
 use crate::{capture::Camera, disk, input};
 
@@ -31,10 +32,6 @@ const MOVED: &str = "dataparser_transforms.json";
 
 /// Largest number of frames of a path.
 pub const MOST_FRAMES: usize = 100_000;
-
-/// Largest cosine between two axes of a pose, ideally 0: files have few digits, and larger ones are
-/// no pose.
-const SKEW: f64 = 1e-2;
 
 /// Error of reading a camera path.
 #[derive(Debug, thiserror::Error)]
@@ -157,13 +154,6 @@ struct Trained {
     fy: f64,
 }
 
-/// Nerfstudio's transform of COLMAP's world: x becomes `scale` · (`transform` · x).
-#[derive(Deserialize)]
-struct WorldTransform {
-    transform: Vec<[f64; 4]>,
-    scale: f64,
-}
-
 /// Reads a camera path; `size` is that of pictures where the file does not say.
 ///
 /// # Errors
@@ -187,7 +177,7 @@ pub fn read_path(path: &Path, size: [u32; 2]) -> Result<PathFile, TrajectoryErro
     {
         read.rate = None;
     }
-    if let Some(moved) = WorldTransform::beside(path)? {
+    if let Some(moved) = moved_beside(path)? {
         read.cameras = read
             .cameras
             .iter()
@@ -202,7 +192,7 @@ pub fn read_path(path: &Path, size: [u32; 2]) -> Result<PathFile, TrajectoryErro
 /// # Errors
 /// The system's, and [`TrajectoryError`] of a file that says how nerfstudio moved the scene.
 pub fn write_path(path: &Path, cameras: &[Camera], rate: f64) -> Result<(), TrajectoryError> {
-    let moved = WorldTransform::beside(path)?;
+    let moved = moved_beside(path)?;
     let size = cameras
         .first()
         .map_or([0, 0], |camera| [camera.width, camera.height]);
@@ -451,60 +441,19 @@ fn to_opengl(camera: &Camera) -> [f64; 16] {
     })
 }
 
-impl WorldTransform {
-    /// The transform beside a path, if there is one.
-    fn beside(path: &Path) -> Result<Option<Self>, TrajectoryError> {
-        let path = path.with_file_name(MOVED);
-        if !path.exists() {
-            return Ok(None);
-        }
-        let moved: Self = read_json(&path)?;
-        match moved.is_sound() {
-            true => Ok(Some(moved)),
-            false => Err(TrajectoryError::Bad {
-                path,
-                reason: "transform has to be a rotation and a way, and scale positive".to_owned(),
-            }),
-        }
+/// The transform beside a path, if there is one.
+fn moved_beside(path: &Path) -> Result<Option<WorldTransform>, TrajectoryError> {
+    let path = path.with_file_name(MOVED);
+    if !path.exists() {
+        return Ok(None);
     }
-
-    fn is_sound(&self) -> bool {
-        if self.transform.len() < 3 || !(self.scale.is_finite() && self.scale > 0.0) {
-            return false;
-        }
-        let (turn, way) = self.parts();
-        let orthogonal = (turn * turn.transpose()).abs_diff_eq(DMat3::IDENTITY, SKEW);
-        orthogonal && turn.determinant() > 0.0 && way.is_finite()
-    }
-
-    fn parts(&self) -> (DMat3, DVec3) {
-        let rows = [0, 1, 2].map(|r| self.transform[r]);
-        let column = |c: usize| DVec3::new(rows[0][c], rows[1][c], rows[2][c]);
-        (DMat3::from_cols(column(0), column(1), column(2)), column(3))
-    }
-
-    /// From nerfstudio's world to COLMAP's.
-    fn back(&self, camera: &Camera) -> Camera {
-        let (turn, way) = self.parts();
-        let rotation = camera.rotation * turn;
-        let center = turn.transpose() * (camera.center() / self.scale - way);
-        Camera {
-            rotation,
-            translation: -(rotation * center),
-            ..camera.clone()
-        }
-    }
-
-    /// From COLMAP's world to nerfstudio's.
-    fn forth(&self, camera: &Camera) -> Camera {
-        let (turn, way) = self.parts();
-        let rotation = camera.rotation * turn.transpose();
-        let center = self.scale * (turn * camera.center() + way);
-        Camera {
-            rotation,
-            translation: -(rotation * center),
-            ..camera.clone()
-        }
+    let moved: WorldTransform = read_json(&path)?;
+    match moved.is_sound() {
+        true => Ok(Some(moved)),
+        false => Err(TrajectoryError::Bad {
+            path,
+            reason: "transform has to be a rotation and a way, and scale positive".to_owned(),
+        }),
     }
 }
 

@@ -5,6 +5,7 @@ mod file;
 mod orbit;
 mod spline;
 mod supersplat;
+mod world;
 
 pub use file::{Coordinates, MOST_FRAMES, PathFile, TrajectoryError, read_path, write_path};
 pub use orbit::{ball_of_splats, orbit_of_ball, orbit_of_cameras};

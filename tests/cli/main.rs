@@ -24,6 +24,7 @@ mod fetch;
 mod folder;
 mod formats;
 mod frames;
+mod frames_film;
 #[cfg(target_os = "linux")]
 mod hard_cases;
 mod harm;

@@ -10,14 +10,7 @@
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join, parse } from "node:path";
 import { parseArgs } from "node:util";
-import { chromium } from "playwright-core";
-
-const FLAGS = [
-  "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-  "--force-color-profile=srgb", "--disable-quic", "--no-first-run", "--disable-background-networking",
-  "--disable-component-update", "--disable-sync",
-];
-const BROWSERS = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+import { launch } from "./browser.mjs";
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,
@@ -31,11 +24,7 @@ const { values, positionals } = parseArgs({
   },
 });
 const [url] = positionals;
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? BROWSERS.find(existsSync),
-  headless: true,
-  args: FLAGS,
-});
+const browser = await launch();
 
 // In the page: the PSNR of two pictures in dB, alike where their 8-bit values are.
 async function compare([ours, theirs]) {

@@ -5,17 +5,10 @@
 // Draws one stroke, places in shares of the photo, waits until the colors settle, undoes and does it
 // again. Prints one line of JSON: milliseconds until the page shows the preview and the settled
 // colors, colors under the stroke, and errors; status 1 where there are any.
-import { existsSync, mkdirSync } from "node:fs";
+import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { parseArgs } from "node:util";
-import { chromium } from "playwright-core";
-
-const FLAGS = [
-  "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-  "--force-color-profile=srgb", "--disable-quic", "--no-first-run", "--disable-background-networking",
-  "--disable-component-update", "--disable-sync",
-];
-const BROWSERS = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+import { launch } from "./browser.mjs";
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,
@@ -29,7 +22,7 @@ const { values, positionals } = parseArgs({
   },
 });
 const numbers = (text) => text.split(",").map(Number);
-const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? BROWSERS.find(existsSync), headless: true, args: FLAGS });
+const browser = await launch();
 const found = { errors: [] };
 try {
   const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });

@@ -6,18 +6,16 @@
 // be made with, and every kernel by name; FOLDER/tape.bin: what is written into buffers. Writes
 // FOLDER/answers.bin, what the reads gave, one after the other. Prints a line of JSON: the
 // adapter, how many entry points were compiled, and the seconds that this and all took. Status 1 where anything went wrong.
-import { createReadStream, createWriteStream, existsSync } from "node:fs";
+import { createReadStream, createWriteStream } from "node:fs";
 import { createServer } from "node:http";
 import { join } from "node:path";
 import { pipeline } from "node:stream/promises";
-import { chromium } from "playwright-core";
+import { launch } from "./browser.mjs";
 
-const FLAGS = [
-  "--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--enable-unsafe-swiftshader",
-  "--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-angle=swiftshader",
-  "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+const WEBGPU = [
+  "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--enable-features=Vulkan", "--use-vulkan=swiftshader",
+  "--use-angle=swiftshader",
 ];
-const BROWSERS = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
 
 const [folder] = process.argv.slice(2);
 const server = createServer(async (request, response) => {
@@ -149,11 +147,7 @@ async function play() {
   return { adapter: `${adapter.info.vendor} ${adapter.info.architecture}`, compiled: pipelines.size, seconds, errors };
 }
 
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? BROWSERS.find(existsSync),
-  headless: true,
-  args: FLAGS,
-});
+const browser = await launch(WEBGPU);
 try {
   const page = await browser.newPage();
   page.setDefaultTimeout(0);
