@@ -8,6 +8,10 @@
 // leaves it in workgroup memory; then the threads add up the shares, one figure
 // each, in a fixed order. No float atomics, no subgroups, the same bits every run.
 //
+// With `simd` eight threads, a vector register of a processor, take the whole tile, two
+// columns each: on software devices every access to memory takes a lane at a time and
+// costs more than the arithmetic of eight pixels, so that parts do not pay.
+//
 // Transmittance is recomputed front to back as `blend` computed it; nothing is
 // recovered by dividing by 1 - alpha.
 import package::common::color::Color;
@@ -20,7 +24,8 @@ import package::common::partials::{PARTIAL_STRIDE, PARTIAL_WORDS, PartialWord};
 @if(playcanvas) import package::common::partials::PARTIAL_OPACITY;
 @if(playcanvas) import package::common::playcanvas::{RESCALE, falloff};
 import package::common::portion::Portion;
-import package::common::projected::{Projected, power_cutoff, touches};
+import package::common::projected::Projected;
+@if(!simd) import package::common::projected::{power_cutoff, touches};
 import package::common::quad::{contributes, powers, quad_alpha};
 @if(geometry) import package::common::quad::Quad;
 import package::common::view::View;
@@ -28,9 +33,11 @@ import package::common::view::View;
 // Four figures of four pixels, a column a pixel.
 @if(figures) alias Quad = mat4x4f;
 
-const THREADS: u32 = 32u;
-const BATCH: u32 = 16u;
-const PARTS: u32 = 4u;
+@if(!simd) const THREADS: u32 = 32u;
+@if(!simd) const BATCH: u32 = 16u;
+@if(simd) const THREADS: u32 = 8u;
+@if(simd) const BATCH: u32 = 48u;
+@if(!simd) const PARTS: u32 = 4u;
 // Threads of a part, and pixels on its side.
 const PART: u32 = 8u;
 // A word more than there are figures, if these are even: neighboring threads
@@ -61,10 +68,11 @@ var<workgroup> conic_opacities: array<vec4f, BATCH>;
 // Where the gradient of an instance goes.
 var<workgroup> batch_slots: array<u32, BATCH>;
 // Parts that an instance touches, a bit each; instances that touch a part.
-var<workgroup> touched: array<u32, BATCH>;
-var<workgroup> touching: array<atomic<u32>, PARTS>;
+@if(!simd) var<workgroup> touched: array<u32, BATCH>;
+@if(!simd) var<workgroup> touching: array<atomic<u32>, PARTS>;
 // Instances of each part up to the last that one of its pixels used; of the tile.
-var<workgroup> part_lasts: array<atomic<u32>, PARTS>;
+@if(!simd) var<workgroup> part_lasts: array<atomic<u32>, PARTS>;
+@if(simd) var<workgroup> tile_last: atomic<u32>;
 var<workgroup> uniform_last: u32;
 
 // One thread's share of one instance.
@@ -109,35 +117,48 @@ fn load(first: vec2u) -> Pixels {
         let at = first + vec2u(0u, k);
         if all(at < view.size) {
             let p = at.y * view.size.x + at.x;
-            pixels.gradient = insert(pixels.gradient, k, image_gradient[p]);
+            let gradient = image_gradient[p];
+            pixels.gradient = insert(pixels.gradient, k, gradient);
             pixels.last[k] = lasts[p];
-            @if(geometry) { pixels.remaining[k] = color_dot(image_gradient[p], image[p]); }
+            @if(geometry) { pixels.remaining[k] = color_dot(gradient, image[p]); }
         }
     }
     return pixels;
 }
 
+// An instance of a batch.
+struct Member {
+    // Its place in the tile's list.
+    own: u32,
+    mean: vec2f,
+    conic_opacity: vec4f,
+    @if(geometry) color: Color,
+}
+
+fn member_at(member: u32, own: u32) -> Member {
+    var found = Member();
+    found.own = own;
+    found.mean = means[member];
+    found.conic_opacity = conic_opacities[member];
+    @if(geometry) { found.color = batch_colors[member]; }
+    return found;
+}
+
 // Adds one quad's share of an instance and moves the quad behind it. `d` is the
 // first pixel relative to the Gaussian's center.
-fn accumulate(
-    share: ptr<function, Share>,
-    pixels: ptr<function, Pixels>,
-    own: u32,
-    conic_opacity: vec4f,
-    d: vec2f,
-    @if(geometry) color: Color,
-) {
+fn accumulate(share: ptr<function, Share>, pixels: ptr<function, Pixels>, member: Member, d: vec2f) {
+    let conic_opacity = member.conic_opacity;
     let power = powers(conic_opacity.xyz, d);
     @if(!playcanvas) let raw = conic_opacity.w * exp(-power);
     @if(playcanvas) let raw = conic_opacity.w * falloff(power);
     let alpha = quad_alpha(raw);
     let before = (*pixels).transmittance;
-    let hit = contributes(power, alpha) & (vec4u(own) < (*pixels).last);
+    let hit = contributes(power, alpha) & (vec4u(member.own) < (*pixels).last);
     let weight = select(vec4f(0.0), alpha * before, hit);
     (*share).color += gathered(weight, (*pixels).gradient);
     (*pixels).transmittance = select(before, before * (1.0 - alpha), hit);
     @if(geometry) {
-        let contribution = (*pixels).gradient * color;
+        let contribution = (*pixels).gradient * member.color;
         let behind = (*pixels).remaining - weight * contribution;
         (*pixels).remaining = behind;
         let v_alpha = before * contribution - behind / (1.0 - alpha);
@@ -158,8 +179,52 @@ fn accumulate(
     }
 }
 
+// Instances up to the last that one of the pixels used.
+fn last_of(pixels: Pixels) -> u32 {
+    let last = pixels.last;
+    return max(max(last.x, last.y), max(last.z, last.w));
+}
+
+// Fetches a member of the batch.
+fn fetch(member: u32, slot: u32) -> Projected {
+    let i = instance_splats[slot];
+    let splat = projected[i];
+    batch_slots[member] = slot;
+    means[member] = splat.mean;
+    conic_opacities[member] = splat.conic_opacity;
+    @if(geometry) { batch_colors[member] = colors[i]; }
+    return splat;
+}
+
+// Leaves a thread's share of a member.
+fn leave(member: u32, thread: u32, share: Share) {
+    let at = (member * THREADS + thread) * SHARE;
+    @if(geometry) {
+        shares[at] = share.moments.x;
+        shares[at + 1u] = share.moments.y;
+        shares[at + 2u] = share.moments.z;
+        shares[at + 3u] = share.moments.w;
+        shares[at + 4u] = share.moments_y.x;
+        shares[at + 5u] = share.moments_y.y;
+        shares[at + PARTIAL_PULL] = share.pull;
+    }
+    @if(luma) { shares[at + PARTIAL_COLOR] = share.color; }
+    @if(rgb) {
+        shares[at + PARTIAL_COLOR] = share.color.x;
+        shares[at + PARTIAL_COLOR + 1u] = share.color.y;
+        shares[at + PARTIAL_COLOR + 2u] = share.color.z;
+    }
+    @if(playcanvas) { shares[at + PARTIAL_OPACITY] = share.opacity; }
+    @if(figures) {
+        shares[at] = share.color.x;
+        shares[at + 1u] = share.color.y;
+        shares[at + 2u] = share.color.z;
+        shares[at + 3u] = share.color.w;
+    }
+}
+
 // One figure of a batch's member, the shares of all threads added up.
-fn figure_sum(member: u32, figure: u32) -> f32 {
+@if(!simd) fn figure_sum(member: u32, figure: u32) -> f32 {
     var parts = touched[member];
     var sum = 0.0;
     while parts != 0u {
@@ -171,6 +236,13 @@ fn figure_sum(member: u32, figure: u32) -> f32 {
     }
     return sum;
 }
+@if(simd) fn figure_sum(member: u32, figure: u32) -> f32 {
+    let at = member * THREADS * SHARE + figure;
+    // No loop: llvmpipe ends a thread's loops after 65,535 iterations altogether.
+    let first = shares[at] + shares[at + SHARE] + (shares[at + 2u * SHARE] + shares[at + 3u * SHARE]);
+    let others = shares[at + 4u * SHARE] + shares[at + 5u * SHARE] + (shares[at + 6u * SHARE] + shares[at + 7u * SHARE]);
+    return first + others;
+}
 
 // A word of the member's record.
 @if(!half) fn record_word(member: u32, word: u32) -> f32 { return figure_sum(member, word); }
@@ -178,6 +250,28 @@ fn figure_sum(member: u32, figure: u32) -> f32 {
     return packed(figure_sum(member, 2u * word), figure_sum(member, 2u * word + 1u));
 }
 
+// Writes the records of a batch.
+fn record(members: u32, thread: u32) {
+    for (var task = thread; task < PARTIAL_WORDS * members; task += THREADS) {
+        let member = task / PARTIAL_WORDS;
+        let word = task % PARTIAL_WORDS;
+        partials[batch_slots[member] * PARTIAL_WORDS + word] = record_word(member, word);
+    }
+}
+
+// Instances from `used` on, behind the last one used, have no gradient, and must say so.
+fn record_unused(tile: u32, used: u32, thread: u32) {
+    let start = starts[tile];
+    let count = starts[tile + 1u] - start;
+    for (var own = used + thread; own < count; own += THREADS) {
+        let at = slots[start + own] * PARTIAL_WORDS;
+        for (var c = 0u; c < PARTIAL_WORDS; c++) {
+            partials[at + c] = PartialWord();
+        }
+    }
+}
+
+@if(!simd)
 @compute @workgroup_size(THREADS)
 fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) thread: u32) {
     let tile = portion.first + linear_group(group);
@@ -189,12 +283,11 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
     let part = thread / PART;
     var upper = load(first);
     var lower = load(first + vec2u(0u, 4u));
-    let most = max(upper.last, lower.last);
     if thread < PARTS {
         atomicStore(&part_lasts[thread], 0u);
     }
     workgroupBarrier();
-    atomicMax(&part_lasts[part], max(max(most.x, most.y), max(most.z, most.w)));
+    atomicMax(&part_lasts[part], max(last_of(upper), last_of(lower)));
     workgroupBarrier();
     if thread == 0u {
         uniform_last = max(max(atomicLoad(&part_lasts[0]), atomicLoad(&part_lasts[1])),
@@ -209,13 +302,7 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
         }
         workgroupBarrier();
         if thread < members {
-            let slot = slots[start + batch + thread];
-            let i = instance_splats[slot];
-            let splat = projected[i];
-            batch_slots[thread] = slot;
-            means[thread] = splat.mean;
-            conic_opacities[thread] = splat.conic_opacity;
-            @if(geometry) { batch_colors[thread] = colors[i]; }
+            let splat = fetch(thread, slots[start + batch + thread]);
             let cutoff = power_cutoff(splat.conic_opacity.w);
             var parts = 0u;
             for (var p = 0u; p < PARTS; p++) {
@@ -232,57 +319,74 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
         while left != 0u {
             let member = firstTrailingBit(left);
             left &= left - 1u;
-            let own = batch + member;
-            let conic_opacity = conic_opacities[member];
-            let d = vec2f(first) + 0.5 - means[member];
+            let splat = member_at(member, batch + member);
+            let d = vec2f(first) + 0.5 - splat.mean;
             var share = Share();
-            @if(geometry) {
-                let color = batch_colors[member];
-                accumulate(&share, &upper, own, conic_opacity, d, color);
-                accumulate(&share, &lower, own, conic_opacity, d + vec2f(0.0, 4.0), color);
-            }
-            @if(!geometry) {
-                accumulate(&share, &upper, own, conic_opacity, d);
-                accumulate(&share, &lower, own, conic_opacity, d + vec2f(0.0, 4.0));
-            }
-            let at = (member * THREADS + thread) * SHARE;
-            @if(geometry) {
-                shares[at] = share.moments.x;
-                shares[at + 1u] = share.moments.y;
-                shares[at + 2u] = share.moments.z;
-                shares[at + 3u] = share.moments.w;
-                shares[at + 4u] = share.moments_y.x;
-                shares[at + 5u] = share.moments_y.y;
-                shares[at + PARTIAL_PULL] = share.pull;
-            }
-            @if(luma) { shares[at + PARTIAL_COLOR] = share.color; }
-            @if(rgb) {
-                shares[at + PARTIAL_COLOR] = share.color.x;
-                shares[at + PARTIAL_COLOR + 1u] = share.color.y;
-                shares[at + PARTIAL_COLOR + 2u] = share.color.z;
-            }
-            @if(playcanvas) { shares[at + PARTIAL_OPACITY] = share.opacity; }
-            @if(figures) {
-                shares[at] = share.color.x;
-                shares[at + 1u] = share.color.y;
-                shares[at + 2u] = share.color.z;
-                shares[at + 3u] = share.color.w;
-            }
+            accumulate(&share, &upper, splat, d);
+            accumulate(&share, &lower, splat, d + vec2f(0.0, 4.0));
+            leave(member, thread, share);
         }
         workgroupBarrier();
-        for (var task = thread; task < PARTIAL_WORDS * members; task += THREADS) {
-            let member = task / PARTIAL_WORDS;
-            let word = task % PARTIAL_WORDS;
-            partials[batch_slots[member] * PARTIAL_WORDS + word] = record_word(member, word);
-        }
+        record(members, thread);
         workgroupBarrier();
     }
-    // Instances behind the last one used have no gradient, and must say so.
-    let count = starts[tile + 1u] - start;
-    for (var own = used + thread; own < count; own += THREADS) {
-        let at = slots[start + own] * PARTIAL_WORDS;
-        for (var c = 0u; c < PARTIAL_WORDS; c++) {
-            partials[at + c] = PartialWord();
-        }
+    record_unused(tile, used, thread);
+}
+
+@if(simd)
+@compute @workgroup_size(THREADS)
+fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) thread: u32) {
+    let tile = portion.first + linear_group(group);
+    if tile >= view.tiles.x * view.tiles.y {
+        return;
     }
+    let left = vec2u(tile % view.tiles.x, tile / view.tiles.x) * TILE_SIDE + vec2u(thread, 0u);
+    let right = left + vec2u(PART, 0u);
+    var left_0 = load(left);
+    var left_1 = load(left + vec2u(0u, 4u));
+    var left_2 = load(left + vec2u(0u, 8u));
+    var left_3 = load(left + vec2u(0u, 12u));
+    var right_0 = load(right);
+    var right_1 = load(right + vec2u(0u, 4u));
+    var right_2 = load(right + vec2u(0u, 8u));
+    var right_3 = load(right + vec2u(0u, 12u));
+    if thread == 0u {
+        atomicStore(&tile_last, 0u);
+    }
+    workgroupBarrier();
+    let left_last = max(max(last_of(left_0), last_of(left_1)), max(last_of(left_2), last_of(left_3)));
+    let right_last = max(max(last_of(right_0), last_of(right_1)), max(last_of(right_2), last_of(right_3)));
+    atomicMax(&tile_last, max(left_last, right_last));
+    workgroupBarrier();
+    if thread == 0u {
+        uniform_last = atomicLoad(&tile_last);
+    }
+    let used = workgroupUniformLoad(&uniform_last);
+    let start = starts[tile];
+    for (var batch = 0u; batch < used; batch += BATCH) {
+        let members = min(BATCH, used - batch);
+        for (var member = thread; member < members; member += THREADS) {
+            _ = fetch(member, slots[start + batch + member]);
+        }
+        workgroupBarrier();
+        for (var member = 0u; member < members; member++) {
+            let splat = member_at(member, batch + member);
+            let d = vec2f(left) + 0.5 - splat.mean;
+            let e = d + vec2f(f32(PART), 0.0);
+            var share = Share();
+            accumulate(&share, &left_0, splat, d);
+            accumulate(&share, &left_1, splat, d + vec2f(0.0, 4.0));
+            accumulate(&share, &left_2, splat, d + vec2f(0.0, 8.0));
+            accumulate(&share, &left_3, splat, d + vec2f(0.0, 12.0));
+            accumulate(&share, &right_0, splat, e);
+            accumulate(&share, &right_1, splat, e + vec2f(0.0, 4.0));
+            accumulate(&share, &right_2, splat, e + vec2f(0.0, 8.0));
+            accumulate(&share, &right_3, splat, e + vec2f(0.0, 12.0));
+            leave(member, thread, share);
+        }
+        workgroupBarrier();
+        record(members, thread);
+        workgroupBarrier();
+    }
+    record_unused(tile, used, thread);
 }

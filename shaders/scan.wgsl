@@ -1,11 +1,16 @@
 // Exclusive prefix sum in place: reduce blocks, scan the block sums, apply.
 // The total is checked against a limit: a list that would not fit sets the
 // overflow word, is reported with what it needs, and counts as empty from there.
+//
+// With `simd` eight threads, a vector register of a processor, scan all in one dispatch: a
+// dispatch costs more there than thousands of elements, and so does every barrier.
 import package::common::constants::{STATUS_NEEDED, STATUS_OVERFLOW};
-import package::common::groups::{Groups, SCAN_BLOCK, blocks, groups_for_count};
-import package::common::numeric::linear_group;
+import package::common::groups::{Groups, blocks, groups_for_count};
+@if(!simd) import package::common::groups::SCAN_BLOCK;
+@if(!simd) import package::common::numeric::linear_group;
 
-const SCAN_PER_THREAD: u32 = 4u;
+@if(!simd) const SCAN_PER_THREAD: u32 = 4u;
+@if(simd) const LANES: u32 = 8u;
 
 struct ScanParameters {
     // Which of `elements` counts the elements to scan.
@@ -17,16 +22,31 @@ struct ScanParameters {
 
 @group(0) @binding(0) var<uniform> parameters: ScanParameters;
 @group(0) @binding(1) var<storage, read_write> values: array<u32>;
-@group(0) @binding(2) var<storage, read_write> block_sums: array<u32>;
+@if(!simd) @group(0) @binding(2) var<storage, read_write> block_sums: array<u32>;
 @group(0) @binding(3) var<storage, read_write> status: array<u32>;
 @group(0) @binding(4) var<storage, read> elements: array<Groups, 4>;
 // The workgroups for as many elements as the total says.
 @group(0) @binding(5) var<storage, read_write> total: array<Groups, 4>;
 
-var<workgroup> sums: array<u32, 256>;
+@if(!simd) var<workgroup> sums: array<u32, 256>;
+@if(simd) var<workgroup> sums: array<u32, LANES>;
+
+// Notes the total.
+fn conclude(sum: u32) {
+    if parameters.total_word != 0xffffffffu {
+        var known = sum;
+        if sum > parameters.limit {
+            status[STATUS_OVERFLOW] = 1u;
+            status[STATUS_NEEDED] = max(status[STATUS_NEEDED], sum);
+            known = 0u;
+        }
+        status[parameters.total_word] = known;
+        total = groups_for_count(known);
+    }
+}
 
 // Inclusive scan over the workgroup; returns the sum before this thread.
-fn exclusive_over_group(local: u32, own: u32) -> u32 {
+@if(!simd) fn exclusive_over_group(local: u32, own: u32) -> u32 {
     sums[local] = own;
     for (var step = 1u; step < 256u; step *= 2u) {
         workgroupBarrier();
@@ -41,6 +61,7 @@ fn exclusive_over_group(local: u32, own: u32) -> u32 {
     return sums[local] - own;
 }
 
+@if(!simd)
 @compute @workgroup_size(256)
 fn scan_reduce(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
     let block = linear_group(group);
@@ -56,6 +77,7 @@ fn scan_reduce(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
     }
 }
 
+@if(!simd)
 @compute @workgroup_size(256)
 fn scan_sums(@builtin(local_invocation_index) local: u32) {
     let block_count = blocks(elements[parameters.which].length, SCAN_BLOCK);
@@ -74,17 +96,12 @@ fn scan_sums(@builtin(local_invocation_index) local: u32) {
         carry += sums[255];
         workgroupBarrier();
     }
-    if local == 0u && parameters.total_word != 0xffffffffu {
-        if carry > parameters.limit {
-            status[STATUS_OVERFLOW] = 1u;
-            status[STATUS_NEEDED] = max(status[STATUS_NEEDED], carry);
-            carry = 0u;
-        }
-        status[parameters.total_word] = carry;
-        total = groups_for_count(carry);
+    if local == 0u {
+        conclude(carry);
     }
 }
 
+@if(!simd)
 @compute @workgroup_size(256)
 fn scan_apply(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
     let block = linear_group(group);
@@ -97,6 +114,33 @@ fn scan_apply(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
     var before = exclusive_over_group(local, own);
     if first < end {
         before += block_sums[block];
+    }
+    for (var k = first; k < end; k++) {
+        let value = values[k];
+        values[k] = before;
+        before += value;
+    }
+}
+
+@if(simd)
+@compute @workgroup_size(LANES)
+fn scan_whole(@builtin(local_invocation_index) local: u32) {
+    let length = elements[parameters.which].length;
+    let each = blocks(length, LANES);
+    let first = min(local * each, length);
+    let end = min(first + each, length);
+    var own = 0u;
+    for (var k = first; k < end; k++) {
+        own += values[k];
+    }
+    sums[local] = own;
+    workgroupBarrier();
+    var before = 0u;
+    for (var lane = 0u; lane < local; lane++) {
+        before += sums[lane];
+    }
+    if local == LANES - 1u {
+        conclude(before + own);
     }
     for (var k = first; k < end; k++) {
         let value = values[k];

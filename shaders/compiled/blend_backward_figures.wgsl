@@ -9,12 +9,11 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
     let part = thread / PART;
     var upper = load(first);
     var lower = load(first + vec2u(0u, 4u));
-    let most = max(upper.last, lower.last);
     if thread < PARTS {
         atomicStore(&part_lasts[thread], 0u);
     }
     workgroupBarrier();
-    atomicMax(&part_lasts[part], max(max(most.x, most.y), max(most.z, most.w)));
+    atomicMax(&part_lasts[part], max(last_of(upper), last_of(lower)));
     workgroupBarrier();
     if thread == 0u {
         uniform_last = max(max(atomicLoad(&part_lasts[0]), atomicLoad(&part_lasts[1])), max(atomicLoad(&part_lasts[2]), atomicLoad(&part_lasts[3])));
@@ -28,12 +27,7 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
         }
         workgroupBarrier();
         if thread < members {
-            let slot = slots[start + batch + thread];
-            let i = instance_splats[slot];
-            let splat = projected[i];
-            batch_slots[thread] = slot;
-            means[thread] = splat.mean;
-            conic_opacities[thread] = splat.conic_opacity;
+            let splat = fetch(thread, slots[start + batch + thread]);
             let cutoff = power_cutoff(splat.conic_opacity.w);
             var parts = 0u;
             for (var p = 0u; p < PARTS; p++) {
@@ -50,37 +44,18 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
         while (left != 0u) {
             let member = firstTrailingBit(left);
             left &= left - 1u;
-            let own = batch + member;
-            let conic_opacity = conic_opacities[member];
-            let d = vec2f(first) + 0.5 - means[member];
+            let splat = member_at(member, batch + member);
+            let d = vec2f(first) + 0.5 - splat.mean;
             var share = Share();
-            {
-                accumulate(&share, &upper, own, conic_opacity, d);
-                accumulate(&share, &lower, own, conic_opacity, d + vec2f(0.0, 4.0));
-            }
-            let at = (member * THREADS + thread) * SHARE;
-            {
-                shares[at] = share.color.x;
-                shares[at + 1u] = share.color.y;
-                shares[at + 2u] = share.color.z;
-                shares[at + 3u] = share.color.w;
-            }
+            accumulate(&share, &upper, splat, d);
+            accumulate(&share, &lower, splat, d + vec2f(0.0, 4.0));
+            leave(member, thread, share);
         }
         workgroupBarrier();
-        for (var task = thread; task < PARTIAL_WORDS * members; task += THREADS) {
-            let member = task / PARTIAL_WORDS;
-            let word = task % PARTIAL_WORDS;
-            partials[batch_slots[member] * PARTIAL_WORDS + word] = record_word(member, word);
-        }
+        record(members, thread);
         workgroupBarrier();
     }
-    let count = starts[tile + 1u] - start;
-    for (var own = used + thread; own < count; own += THREADS) {
-        let at = slots[start + own] * PARTIAL_WORDS;
-        for (var c = 0u; c < PARTIAL_WORDS; c++) {
-            partials[at + c] = PartialWord();
-        }
-    }
+    record_unused(tile, used, thread);
 }
 
 @group(0) @binding(0)
@@ -136,12 +111,13 @@ const THREADS: u32 = 32u;
 
 const TILE_SIDE: u32 = 16u;
 
-fn accumulate(share: ptr<function, Share>, pixels: ptr<function, Pixels>, own: u32, conic_opacity: vec4f, d: vec2f) {
+fn accumulate(share: ptr<function, Share>, pixels: ptr<function, Pixels>, member: Member, d: vec2f) {
+    let conic_opacity = member.conic_opacity;
     let power = powers(conic_opacity.xyz, d);
     let raw = conic_opacity.w * exp(-power);
     let alpha = quad_alpha(raw);
     let before = (*pixels).transmittance;
-    let hit = contributes(power, alpha) & (vec4u(own) < (*pixels).last);
+    let hit = contributes(power, alpha) & (vec4u(member.own) < (*pixels).last);
     let weight = select(vec4f(0.0), alpha * before, hit);
     (*share).color += gathered(weight, (*pixels).gradient);
     (*pixels).transmittance = select(before, before * (1.0 - alpha), hit);
@@ -149,6 +125,15 @@ fn accumulate(share: ptr<function, Share>, pixels: ptr<function, Pixels>, own: u
 
 fn contributes(power: vec4f, alpha: vec4f) -> vec4<bool> {
     return (power >= vec4f(0.0)) & (alpha >= vec4f(ALPHA_MIN));
+}
+
+fn fetch(member: u32, slot: u32) -> Projected {
+    let i = instance_splats[slot];
+    let splat = projected[i];
+    batch_slots[member] = slot;
+    means[member] = splat.mean;
+    conic_opacities[member] = splat.conic_opacity;
+    return splat;
 }
 
 fn figure_sum(member: u32, figure: u32) -> f32 {
@@ -174,6 +159,11 @@ fn insert(quad: Quad, k: u32, color: Color) -> Quad {
     return q;
 }
 
+fn last_of(pixels: Pixels) -> u32 {
+    let last = pixels.last;
+    return max(max(last.x, last.y), max(last.z, last.w));
+}
+
 fn least_power(splat: Projected, low: vec2f, high: vec2f) -> f32 {
     let conic = splat.conic_opacity.xyz;
     let nearest = clamp(splat.mean, low, high) - splat.mean;
@@ -187,6 +177,16 @@ fn least_power(splat: Projected, low: vec2f, high: vec2f) -> f32 {
     return min(power_at(conic, on_vertical), power_at(conic, on_horizontal));
 }
 
+fn leave(member: u32, thread: u32, share: Share) {
+    let at = (member * THREADS + thread) * SHARE;
+    {
+        shares[at] = share.color.x;
+        shares[at + 1u] = share.color.y;
+        shares[at + 2u] = share.color.z;
+        shares[at + 3u] = share.color.w;
+    }
+}
+
 fn linear_group(group: vec3u) -> u32 {
     return group.x + group.y * MAX_GROUPS;
 }
@@ -198,11 +198,20 @@ fn load(first: vec2u) -> Pixels {
         let at = first + vec2u(0u, k);
         if all(at < view.size) {
             let p = at.y * view.size.x + at.x;
-            pixels.gradient = insert(pixels.gradient, k, image_gradient[p]);
+            let gradient = image_gradient[p];
+            pixels.gradient = insert(pixels.gradient, k, gradient);
             pixels.last[k] = lasts[p];
         }
     }
     return pixels;
+}
+
+fn member_at(member: u32, own: u32) -> Member {
+    var found = Member();
+    found.own = own;
+    found.mean = means[member];
+    found.conic_opacity = conic_opacities[member];
+    return found;
 }
 
 fn power_at(conic: vec3f, d: vec2f) -> f32 {
@@ -222,6 +231,25 @@ fn quad_alpha(raw: vec4f) -> vec4f {
     return min(vec4f(ALPHA_MAX), raw);
 }
 
+fn record(members: u32, thread: u32) {
+    for (var task = thread; task < PARTIAL_WORDS * members; task += THREADS) {
+        let member = task / PARTIAL_WORDS;
+        let word = task % PARTIAL_WORDS;
+        partials[batch_slots[member] * PARTIAL_WORDS + word] = record_word(member, word);
+    }
+}
+
+fn record_unused(tile: u32, used: u32, thread: u32) {
+    let start = starts[tile];
+    let count = starts[tile + 1u] - start;
+    for (var own = used + thread; own < count; own += THREADS) {
+        let at = slots[start + own] * PARTIAL_WORDS;
+        for (var c = 0u; c < PARTIAL_WORDS; c++) {
+            partials[at + c] = PartialWord();
+        }
+    }
+}
+
 fn record_word(member: u32, word: u32) -> f32 {
     return figure_sum(member, word);
 }
@@ -231,6 +259,12 @@ fn touches(splat: Projected, cutoff: f32, low: vec2f, high: vec2f) -> bool {
 }
 
 override ALPHA_MIN: f32 = 0.00392156862745098;
+
+struct Member {
+    own: u32,
+    mean: vec2f,
+    conic_opacity: vec4f
+}
 
 struct Pixels {
     transmittance: vec4f,

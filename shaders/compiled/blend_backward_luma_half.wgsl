@@ -9,12 +9,11 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
     let part = thread / PART;
     var upper = load(first);
     var lower = load(first + vec2u(0u, 4u));
-    let most = max(upper.last, lower.last);
     if thread < PARTS {
         atomicStore(&part_lasts[thread], 0u);
     }
     workgroupBarrier();
-    atomicMax(&part_lasts[part], max(max(most.x, most.y), max(most.z, most.w)));
+    atomicMax(&part_lasts[part], max(last_of(upper), last_of(lower)));
     workgroupBarrier();
     if thread == 0u {
         uniform_last = max(max(atomicLoad(&part_lasts[0]), atomicLoad(&part_lasts[1])), max(atomicLoad(&part_lasts[2]), atomicLoad(&part_lasts[3])));
@@ -28,15 +27,7 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
         }
         workgroupBarrier();
         if thread < members {
-            let slot = slots[start + batch + thread];
-            let i = instance_splats[slot];
-            let splat = projected[i];
-            batch_slots[thread] = slot;
-            means[thread] = splat.mean;
-            conic_opacities[thread] = splat.conic_opacity;
-            {
-                batch_colors[thread] = colors[i];
-            }
+            let splat = fetch(thread, slots[start + batch + thread]);
             let cutoff = power_cutoff(splat.conic_opacity.w);
             var parts = 0u;
             for (var p = 0u; p < PARTS; p++) {
@@ -53,44 +44,18 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
         while (left != 0u) {
             let member = firstTrailingBit(left);
             left &= left - 1u;
-            let own = batch + member;
-            let conic_opacity = conic_opacities[member];
-            let d = vec2f(first) + 0.5 - means[member];
+            let splat = member_at(member, batch + member);
+            let d = vec2f(first) + 0.5 - splat.mean;
             var share = Share();
-            {
-                let color = batch_colors[member];
-                accumulate(&share, &upper, own, conic_opacity, d, color);
-                accumulate(&share, &lower, own, conic_opacity, d + vec2f(0.0, 4.0), color);
-            }
-            let at = (member * THREADS + thread) * SHARE;
-            {
-                shares[at] = share.moments.x;
-                shares[at + 1u] = share.moments.y;
-                shares[at + 2u] = share.moments.z;
-                shares[at + 3u] = share.moments.w;
-                shares[at + 4u] = share.moments_y.x;
-                shares[at + 5u] = share.moments_y.y;
-                shares[at + PARTIAL_PULL] = share.pull;
-            }
-            {
-                shares[at + PARTIAL_COLOR] = share.color;
-            }
+            accumulate(&share, &upper, splat, d);
+            accumulate(&share, &lower, splat, d + vec2f(0.0, 4.0));
+            leave(member, thread, share);
         }
         workgroupBarrier();
-        for (var task = thread; task < PARTIAL_WORDS * members; task += THREADS) {
-            let member = task / PARTIAL_WORDS;
-            let word = task % PARTIAL_WORDS;
-            partials[batch_slots[member] * PARTIAL_WORDS + word] = record_word(member, word);
-        }
+        record(members, thread);
         workgroupBarrier();
     }
-    let count = starts[tile + 1u] - start;
-    for (var own = used + thread; own < count; own += THREADS) {
-        let at = slots[start + own] * PARTIAL_WORDS;
-        for (var c = 0u; c < PARTIAL_WORDS; c++) {
-            partials[at + c] = PartialWord();
-        }
-    }
+    record_unused(tile, used, thread);
 }
 
 @group(0) @binding(0)
@@ -158,17 +123,18 @@ const THREADS: u32 = 32u;
 
 const TILE_SIDE: u32 = 16u;
 
-fn accumulate(share: ptr<function, Share>, pixels: ptr<function, Pixels>, own: u32, conic_opacity: vec4f, d: vec2f, color: Color) {
+fn accumulate(share: ptr<function, Share>, pixels: ptr<function, Pixels>, member: Member, d: vec2f) {
+    let conic_opacity = member.conic_opacity;
     let power = powers(conic_opacity.xyz, d);
     let raw = conic_opacity.w * exp(-power);
     let alpha = quad_alpha(raw);
     let before = (*pixels).transmittance;
-    let hit = contributes(power, alpha) & (vec4u(own) < (*pixels).last);
+    let hit = contributes(power, alpha) & (vec4u(member.own) < (*pixels).last);
     let weight = select(vec4f(0.0), alpha * before, hit);
     (*share).color += gathered(weight, (*pixels).gradient);
     (*pixels).transmittance = select(before, before * (1.0 - alpha), hit);
     {
-        let contribution = (*pixels).gradient * color;
+        let contribution = (*pixels).gradient * member.color;
         let behind = (*pixels).remaining - weight * contribution;
         (*pixels).remaining = behind;
         let v_alpha = before * contribution - behind / (1.0 - alpha);
@@ -191,6 +157,18 @@ fn color_dot(a: Color, b: Color) -> f32 {
 
 fn contributes(power: vec4f, alpha: vec4f) -> vec4<bool> {
     return (power >= vec4f(0.0)) & (alpha >= vec4f(ALPHA_MIN));
+}
+
+fn fetch(member: u32, slot: u32) -> Projected {
+    let i = instance_splats[slot];
+    let splat = projected[i];
+    batch_slots[member] = slot;
+    means[member] = splat.mean;
+    conic_opacities[member] = splat.conic_opacity;
+    {
+        batch_colors[member] = colors[i];
+    }
+    return splat;
 }
 
 fn figure_sum(member: u32, figure: u32) -> f32 {
@@ -220,6 +198,11 @@ fn is_finite(x: f32) -> bool {
     return (bitcast<u32>(x) & 2147483647u) < 2139095040u;
 }
 
+fn last_of(pixels: Pixels) -> u32 {
+    let last = pixels.last;
+    return max(max(last.x, last.y), max(last.z, last.w));
+}
+
 fn least_power(splat: Projected, low: vec2f, high: vec2f) -> f32 {
     let conic = splat.conic_opacity.xyz;
     let nearest = clamp(splat.mean, low, high) - splat.mean;
@@ -233,6 +216,22 @@ fn least_power(splat: Projected, low: vec2f, high: vec2f) -> f32 {
     return min(power_at(conic, on_vertical), power_at(conic, on_horizontal));
 }
 
+fn leave(member: u32, thread: u32, share: Share) {
+    let at = (member * THREADS + thread) * SHARE;
+    {
+        shares[at] = share.moments.x;
+        shares[at + 1u] = share.moments.y;
+        shares[at + 2u] = share.moments.z;
+        shares[at + 3u] = share.moments.w;
+        shares[at + 4u] = share.moments_y.x;
+        shares[at + 5u] = share.moments_y.y;
+        shares[at + PARTIAL_PULL] = share.pull;
+    }
+    {
+        shares[at + PARTIAL_COLOR] = share.color;
+    }
+}
+
 fn linear_group(group: vec3u) -> u32 {
     return group.x + group.y * MAX_GROUPS;
 }
@@ -244,14 +243,26 @@ fn load(first: vec2u) -> Pixels {
         let at = first + vec2u(0u, k);
         if all(at < view.size) {
             let p = at.y * view.size.x + at.x;
-            pixels.gradient = insert(pixels.gradient, k, image_gradient[p]);
+            let gradient = image_gradient[p];
+            pixels.gradient = insert(pixels.gradient, k, gradient);
             pixels.last[k] = lasts[p];
             {
-                pixels.remaining[k] = color_dot(image_gradient[p], image[p]);
+                pixels.remaining[k] = color_dot(gradient, image[p]);
             }
         }
     }
     return pixels;
+}
+
+fn member_at(member: u32, own: u32) -> Member {
+    var found = Member();
+    found.own = own;
+    found.mean = means[member];
+    found.conic_opacity = conic_opacities[member];
+    {
+        found.color = batch_colors[member];
+    }
+    return found;
 }
 
 fn packed(low: f32, high: f32) -> u32 {
@@ -275,6 +286,25 @@ fn quad_alpha(raw: vec4f) -> vec4f {
     return min(vec4f(ALPHA_MAX), raw);
 }
 
+fn record(members: u32, thread: u32) {
+    for (var task = thread; task < PARTIAL_WORDS * members; task += THREADS) {
+        let member = task / PARTIAL_WORDS;
+        let word = task % PARTIAL_WORDS;
+        partials[batch_slots[member] * PARTIAL_WORDS + word] = record_word(member, word);
+    }
+}
+
+fn record_unused(tile: u32, used: u32, thread: u32) {
+    let start = starts[tile];
+    let count = starts[tile + 1u] - start;
+    for (var own = used + thread; own < count; own += THREADS) {
+        let at = slots[start + own] * PARTIAL_WORDS;
+        for (var c = 0u; c < PARTIAL_WORDS; c++) {
+            partials[at + c] = PartialWord();
+        }
+    }
+}
+
 fn record_word(member: u32, word: u32) -> u32 {
     return packed(figure_sum(member, 2u * word), figure_sum(member, 2u * word + 1u));
 }
@@ -290,6 +320,13 @@ fn upper_half(x: f32) -> u32 {
 }
 
 override ALPHA_MIN: f32 = 0.00392156862745098;
+
+struct Member {
+    own: u32,
+    mean: vec2f,
+    conic_opacity: vec4f,
+    color: Color
+}
 
 struct Pixels {
     transmittance: vec4f,

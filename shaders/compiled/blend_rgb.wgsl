@@ -6,16 +6,11 @@ fn blend(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) loca
     }
     let corner = vec2u(tile % view.tiles.x, tile / view.tiles.x) * TILE_SIDE;
     let first = corner + vec2u(local.x, local.y * 4u);
-    let rows = first.y + vec4u(0u, 1u, 2u, 3u);
     let center = vec2f(first) + 0.5;
     let part = thread / 8u;
     let start = starts[tile];
     let count = starts[tile + 1u] - start;
-    var color = Quad();
-    var transmittance = vec4f(1.0);
-    var last = vec4u(0u);
-    let inside = vec4<bool>(first.x < view.size.x) & (rows < vec4u(view.size.y));
-    var live = inside;
+    var pixels = begin(first);
     for (var batch = 0u; batch < count; batch += BATCH) {
         if thread < 2u * PARTS {
             atomicStore(&touching[thread], 0u);
@@ -25,11 +20,7 @@ fn blend(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) loca
         }
         workgroupBarrier();
         if batch + thread < count {
-            let i = instance_splats[slots[start + batch + thread]];
-            let splat = projected[i];
-            means[thread] = splat.mean;
-            conic_opacities[thread] = splat.conic_opacity;
-            batch_colors[thread] = colors[i];
+            let splat = fetch(thread, slots[start + batch + thread]);
             let cutoff = power_cutoff(splat.conic_opacity.w);
             for (var p = 0u; p < PARTS; p++) {
                 let low = vec2f(corner) + 0.5 + vec2f(vec2u(p % 2u, p / 2u)) * PART_SIZE;
@@ -38,7 +29,7 @@ fn blend(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) loca
                 }
             }
         }
-        if any(live) {
+        if any(pixels.live) {
             atomicStore(&drawing, 1u);
         }
         workgroupBarrier();
@@ -50,34 +41,15 @@ fn blend(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) loca
         }
         for (var word = 0u; word < 2u; word++) {
             var left = atomicLoad(&touching[2u * part + word]);
-            while (left != 0u && any(live)) {
+            while (left != 0u && any(pixels.live)) {
                 let k = 32u * word + firstTrailingBit(left);
                 left &= left - 1u;
-                let power = powers(conic_opacities[k].xyz, center - means[k]);
-                let alpha = quad_alpha(conic_opacities[k].w * exp(-power));
-                let next = transmittance * (1.0 - alpha);
-                let hit = contributes(power, alpha) & live;
-                let open = next >= vec4f(TRANSMITTANCE_MIN);
-                let used = hit & open;
-                {
-                    color += weighted(select(vec4f(0.0), alpha * transmittance, used), batch_colors[k]);
-                    last = select(last, vec4u(batch + k + 1u), used);
-                }
-                transmittance = select(transmittance, next, used);
-                live = live & (open | !hit);
+                draw(&pixels, batch + k, conic_opacities[k], center - means[k], batch_colors[k]);
             }
         }
         workgroupBarrier();
     }
-    for (var row = 0u; row < 4u; row++) {
-        if inside[row] {
-            let p = rows[row] * view.size.x + first.x;
-            {
-                image[p] = pixel_of(color, row);
-                lasts[p] = last[row];
-            }
-        }
-    }
+    end(first, pixels);
 }
 
 @group(0) @binding(0)
@@ -123,8 +95,54 @@ const PART_SIZE: vec2f = vec2f(8.0, 4.0);
 
 const TILE_SIDE: u32 = 16u;
 
+fn begin(first: vec2u) -> Pixels {
+    let rows = first.y + vec4u(0u, 1u, 2u, 3u);
+    let inside = vec4<bool>(first.x < view.size.x) & (rows < vec4u(view.size.y));
+    var pixels = Pixels();
+    pixels.transmittance = vec4f(1.0);
+    pixels.live = inside;
+    return pixels;
+}
+
 fn contributes(power: vec4f, alpha: vec4f) -> vec4<bool> {
     return (power >= vec4f(0.0)) & (alpha >= vec4f(ALPHA_MIN));
+}
+
+fn draw(pixels: ptr<function, Pixels>, own: u32, conic_opacity: vec4f, d: vec2f, splat_color: Color) {
+    let transmittance = (*pixels).transmittance;
+    let power = powers(conic_opacity.xyz, d);
+    let alpha = quad_alpha(conic_opacity.w * exp(-power));
+    let next = transmittance * (1.0 - alpha);
+    let hit = contributes(power, alpha) & (*pixels).live;
+    let open = next >= vec4f(TRANSMITTANCE_MIN);
+    let used = hit & open;
+    {
+        (*pixels).color += weighted(select(vec4f(0.0), alpha * transmittance, used), splat_color);
+        (*pixels).last = select((*pixels).last, vec4u(own + 1u), used);
+    }
+    (*pixels).transmittance = select(transmittance, next, used);
+    (*pixels).live = (*pixels).live & (open | !hit);
+}
+
+fn end(first: vec2u, pixels: Pixels) {
+    for (var row = 0u; row < 4u; row++) {
+        if all(first + vec2u(0u, row) < view.size) {
+            let p = (first.y + row) * view.size.x + first.x;
+            {
+                image[p] = pixel_of(pixels.color, row);
+                lasts[p] = pixels.last[row];
+            }
+        }
+    }
+}
+
+fn fetch(member: u32, slot: u32) -> Projected {
+    let i = instance_splats[slot];
+    let splat = projected[i];
+    means[member] = splat.mean;
+    conic_opacities[member] = splat.conic_opacity;
+    batch_colors[member] = colors[i];
+    return splat;
 }
 
 fn least_power(splat: Projected, low: vec2f, high: vec2f) -> f32 {
@@ -176,6 +194,13 @@ fn weighted(weights: vec4f, color: Color) -> Quad {
 override ALPHA_MIN: f32 = 0.00392156862745098;
 
 override TRANSMITTANCE_MIN: f32 = 0.0001;
+
+struct Pixels {
+    color: Quad,
+    transmittance: vec4f,
+    last: vec4u,
+    live: vec4<bool>
+}
 
 struct Portion {
     first: u32

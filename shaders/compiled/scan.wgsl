@@ -51,14 +51,8 @@ fn scan_sums(@builtin(local_invocation_index) local: u32) {
         carry += sums[255];
         workgroupBarrier();
     }
-    if local == 0u && parameters.total_word != 4294967295u {
-        if carry > parameters.limit {
-            status[STATUS_OVERFLOW] = 1u;
-            status[STATUS_NEEDED] = max(status[STATUS_NEEDED], carry);
-            carry = 0u;
-        }
-        status[parameters.total_word] = carry;
-        total = groups_for_count(carry);
+    if local == 0u {
+        conclude(carry);
     }
 }
 
@@ -98,6 +92,19 @@ const THREADS: u32 = 256u;
 
 fn blocks(length: u32, each: u32) -> u32 {
     return (length + each - 1u) / each;
+}
+
+fn conclude(sum: u32) {
+    if parameters.total_word != 4294967295u {
+        var known = sum;
+        if sum > parameters.limit {
+            status[STATUS_OVERFLOW] = 1u;
+            status[STATUS_NEEDED] = max(status[STATUS_NEEDED], sum);
+            known = 0u;
+        }
+        status[parameters.total_word] = known;
+        total = groups_for_count(known);
+    }
 }
 
 fn exclusive_over_group(local: u32, own: u32) -> u32 {

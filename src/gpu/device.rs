@@ -43,6 +43,7 @@ pub struct Gpu {
     stopwatch: Option<Arc<Mutex<Stopwatch>>>,
     tape_mode: Option<Arc<TapeMode>>,
     tiles_at_once: usize,
+    simd: bool,
     most_bound: u64,
 }
 
@@ -151,6 +152,7 @@ impl Gpu {
         }
         Ok(Self {
             tiles_at_once: default_tiles_at_once(info.device_type),
+            simd: info.device_type == wgpu::DeviceType::Cpu,
             most_bound: u64::MAX,
             inner: Arc::new(Inner {
                 device,
@@ -248,6 +250,22 @@ impl Gpu {
     pub fn with_tiles_at_once(&self, tiles_at_once: usize) -> Self {
         Self {
             tiles_at_once,
+            ..self.clone()
+        }
+    }
+
+    /// Returns true if blending and its adjoint run as suits the vector registers of a processor:
+    /// on software devices.
+    pub fn simd(&self) -> bool {
+        self.simd
+    }
+
+    /// The same device with the kernels for a processor or those for a GPU: for tests of both.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_simd(&self, simd: bool) -> Self {
+        Self {
+            simd,
             ..self.clone()
         }
     }

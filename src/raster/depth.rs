@@ -1,6 +1,6 @@
 //! Median depth of a view: where the transmittance of its pixels falls to one half.
 
-use super::{Raster, lists::Lists};
+use super::{Raster, kernels::variant, lists::Lists};
 use crate::gpu::{Buffer, GpuError, Kernel, Recorder, shaders};
 
 /// Pixels before any Gaussian, for [`blend_depth`]: minus the transmittance to fall to.
@@ -21,7 +21,8 @@ pub fn blend_depth(
 ) -> Result<Buffer<f32>, GpuError> {
     let gpu = &raster.gpu;
     let cutoffs = raster.numerics.cutoffs();
-    let kernel = Kernel::with(gpu, "blend", shaders::BLEND_DEPTH, &cutoffs);
+    let source = variant(gpu, [shaders::BLEND_DEPTH, shaders::BLEND_DEPTH_SIMD]);
+    let kernel = Kernel::with(gpu, "blend", source, &cutoffs);
     let image = Buffer::from_slice(gpu, "depth image", pixels)?;
     let buffers = [
         (0, lists.view.raw()),

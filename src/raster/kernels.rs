@@ -4,6 +4,11 @@
 use super::{AdamSteps, ColorKind, Falloff, RasterNumerics, RasterOptions, Storage};
 use crate::gpu::{Gpu, Kernel, shaders};
 
+/// The variant for a GPU, or that for the vector registers of a processor.
+pub(super) fn variant(gpu: &Gpu, [gpus, processors]: [&'static str; 2]) -> &'static str {
+    if gpu.simd() { processors } else { gpus }
+}
+
 #[derive(Clone)]
 pub(super) struct LayerKernels {
     pub shade: Kernel,
@@ -18,14 +23,14 @@ impl LayerKernels {
             ColorKind::Rgb => shaders::SHADE_RGB,
         };
         let blend = match (falloff, kind) {
-            (_, ColorKind::Luma) => shaders::BLEND_LUMA,
-            (_, ColorKind::Chroma) => shaders::BLEND_CHROMA,
-            (Falloff::Gaussian, ColorKind::Rgb) => shaders::BLEND_RGB,
-            (Falloff::PlayCanvas, ColorKind::Rgb) => shaders::BLEND_RGB_PLAYCANVAS,
+            (_, ColorKind::Luma) => [shaders::BLEND_LUMA, shaders::BLEND_LUMA_SIMD],
+            (_, ColorKind::Chroma) => [shaders::BLEND_CHROMA, shaders::BLEND_CHROMA_SIMD],
+            (Falloff::Gaussian, ColorKind::Rgb) => [shaders::BLEND_RGB, shaders::BLEND_RGB_SIMD],
+            (Falloff::PlayCanvas, ColorKind::Rgb) => [shaders::BLEND_RGB_PLAYCANVAS; 2],
         };
         Self {
             shade: Kernel::new(gpu, "shade", shade),
-            blend: Kernel::with(gpu, "blend", blend, &numerics.cutoffs()),
+            blend: Kernel::with(gpu, "blend", variant(gpu, blend), &numerics.cutoffs()),
         }
     }
 }
@@ -61,22 +66,35 @@ pub(super) struct BlendBackwardKernels {
 
 impl BlendBackwardKernels {
     pub fn new(gpu: &Gpu, numerics: &RasterNumerics) -> Self {
-        let [blend, sum] = match numerics.storage {
-            Storage::Full => [shaders::BLEND_BACKWARD_LUMA, shaders::SUM_INSTANCES_LUMA],
-            Storage::Half => [
-                shaders::BLEND_BACKWARD_LUMA_HALF,
+        let (blend, sum) = match numerics.storage {
+            Storage::Full => (
+                [
+                    shaders::BLEND_BACKWARD_LUMA,
+                    shaders::BLEND_BACKWARD_LUMA_SIMD,
+                ],
+                shaders::SUM_INSTANCES_LUMA,
+            ),
+            Storage::Half => (
+                [
+                    shaders::BLEND_BACKWARD_LUMA_HALF,
+                    shaders::BLEND_BACKWARD_LUMA_HALF_SIMD,
+                ],
                 shaders::SUM_INSTANCES_LUMA_HALF,
-            ],
+            ),
         };
         let cutoff = numerics.alpha_cutoff();
-        let of_blend = |source| Kernel::with(gpu, "blend_backward", source, &cutoff);
+        let of_blend =
+            |sources| Kernel::with(gpu, "blend_backward", variant(gpu, sources), &cutoff);
         Self {
             luma: [
                 of_blend(blend),
                 Kernel::with(gpu, "sum_instances", sum, &cutoff),
             ],
             color: [
-                of_blend(shaders::BLEND_BACKWARD_FIGURES),
+                of_blend([
+                    shaders::BLEND_BACKWARD_FIGURES,
+                    shaders::BLEND_BACKWARD_FIGURES_SIMD,
+                ]),
                 // Nothing is divided by the opacity here.
                 Kernel::new(gpu, "sum_instances", shaders::SUM_INSTANCES_FIGURES),
             ],

@@ -285,16 +285,16 @@ impl Lists {
         let kernels = &raster.lists;
         let groups = groups_for(self.count);
         recorder.dispatch(&raster.projection.project, &self.project, groups);
-        self.scan_visible.record(&raster.scan, recorder);
+        self.scan_visible.record(recorder);
         recorder.dispatch(&kernels.compact, &self.compact, groups);
-        self.by_depth.record(&raster.sort, &raster.scan, recorder);
+        self.by_depth.record(&raster.sort, recorder);
         let tile_lists = |bindings, recorder: &mut Recorder| {
             (self.visible).dispatch(WorkKind::Thread, &kernels.tile_lists, bindings, recorder);
         };
         tile_lists(&self.count_tiles, recorder);
-        self.scan_offsets.record(&raster.scan, recorder);
+        self.scan_offsets.record(recorder);
         tile_lists(&self.emit_tiles, recorder);
-        self.by_tile.record(&raster.sort, &raster.scan, recorder);
+        self.by_tile.record(&raster.sort, recorder);
         recorder.dispatch(
             &kernels.tile_ranges,
             &self.tile_ranges,

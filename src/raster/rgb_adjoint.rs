@@ -2,7 +2,7 @@
 
 use super::{
     AdjointScratch, Falloff, Field, Geometry, Layer, Lists, Raster, StepBuffers,
-    adjoint::BlendAdjoint, constants::STATISTICS_PLANES,
+    adjoint::BlendAdjoint, constants::STATISTICS_PLANES, kernels::variant,
 };
 use crate::gpu::{Bindings, Buffer, GpuError, Kernel, Recorder, groups_for, shaders};
 
@@ -29,7 +29,13 @@ impl RgbAdjointKernels {
         let (gpu, cutoff) = (&raster.gpu, raster.numerics.alpha_cutoff());
         let [blend, sum, shade, project] = match options.falloff {
             Falloff::Gaussian => [
-                shaders::BLEND_BACKWARD_RGB,
+                variant(
+                    gpu,
+                    [
+                        shaders::BLEND_BACKWARD_RGB,
+                        shaders::BLEND_BACKWARD_RGB_SIMD,
+                    ],
+                ),
                 shaders::SUM_INSTANCES_RGB,
                 shaders::SHADE_BACKWARD_RGB_STEP,
                 shaders::PROJECT_BACKWARD_RGB_STEP,

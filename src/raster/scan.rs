@@ -27,21 +27,26 @@ pub struct Total<'a> {
     pub limit: usize,
 }
 
-/// The three entry points.
+/// Elements that one workgroup scans, at most, on software devices: llvmpipe ends a thread's loops
+/// after 65,535 iterations altogether, of which each of the eight takes two for an element of its.
+const WHOLE_UP_TO: usize = 1 << 17;
+
+/// The entry points.
 #[derive(Clone)]
 pub struct ScanKernels {
-    reduce: Kernel,
-    sums: Kernel,
-    apply: Kernel,
+    /// Sums of blocks, their scan, and the blocks from there.
+    blocks: [Kernel; 3],
+    /// One workgroup for all, on software devices.
+    whole: Option<Kernel>,
 }
 
 impl ScanKernels {
     pub(super) fn new(gpu: &Gpu) -> Self {
         let kernel = |name| Kernel::new(gpu, name, shaders::SCAN);
+        let whole = || Kernel::new(gpu, "scan_whole", shaders::SCAN_SIMD);
         Self {
-            reduce: kernel("scan_reduce"),
-            sums: kernel("scan_sums"),
-            apply: kernel("scan_apply"),
+            blocks: ["scan_reduce", "scan_sums", "scan_apply"].map(kernel),
+            whole: gpu.simd().then(whole),
         }
     }
 }
@@ -49,9 +54,15 @@ impl ScanKernels {
 /// A scan tied to its buffer.
 pub struct Scan {
     elements: (Count, WorkKind),
-    reduce: Bindings,
-    sums: Bindings,
-    apply: Bindings,
+    steps: Vec<Step>,
+}
+
+/// A dispatch.
+struct Step {
+    kernel: Kernel,
+    bindings: Bindings,
+    /// Runs a workgroup for each block of elements, not one for all.
+    by_block: bool,
 }
 
 impl Scan {
@@ -79,29 +90,53 @@ impl Scan {
                 limit: u32::try_from(limit).unwrap_or(u32::MAX),
             },
         )?;
-        let block_sums =
-            Buffer::<u32>::zeros(gpu, "scan block sums", values.len().div_ceil(SCAN_BLOCK))?;
         // Without a total nothing is written there.
         let of_total = match &total {
             Some(total) => total.count.clone(),
             None => Count::new(gpu, 0)?,
         };
-        let [p, v, b] = [parameters.raw(), values.raw(), block_sums.raw()];
-        let [s, e, t] = [status.raw(), count.groups().raw(), of_total.groups().raw()];
-        let each = [(0, p), (1, v), (2, b), (4, e)];
+        let [p, v, s] = [parameters.raw(), values.raw(), status.raw()];
+        let [e, t] = [count.groups().raw(), of_total.groups().raw()];
+        let step = |kernel: &Kernel, by_block, buffers: &[(u32, &wgpu::Buffer)]| Step {
+            kernel: kernel.clone(),
+            bindings: kernel.bind_at(gpu, buffers),
+            by_block,
+        };
+        let steps = match &kernels.whole {
+            Some(whole) if values.len() <= WHOLE_UP_TO => {
+                vec![step(
+                    whole,
+                    false,
+                    &[(0, p), (1, v), (3, s), (4, e), (5, t)],
+                )]
+            }
+            _ => {
+                let [reduce, sums, apply] = &kernels.blocks;
+                let blocks = values.len().div_ceil(SCAN_BLOCK);
+                let block_sums = Buffer::<u32>::zeros(gpu, "scan block sums", blocks)?;
+                let b = block_sums.raw();
+                let each = [(0, p), (1, v), (2, b), (4, e)];
+                vec![
+                    step(reduce, true, &each),
+                    step(sums, false, &[(0, p), (2, b), (3, s), (4, e), (5, t)]),
+                    step(apply, true, &each),
+                ]
+            }
+        };
         Ok(Self {
             elements: (count.clone(), work),
-            reduce: kernels.reduce.bind_at(gpu, &each),
-            sums: (kernels.sums).bind_at(gpu, &[(0, p), (2, b), (3, s), (4, e), (5, t)]),
-            apply: kernels.apply.bind_at(gpu, &each),
+            steps,
         })
     }
 
     /// Records the scan.
-    pub fn record(&self, kernels: &ScanKernels, recorder: &mut Recorder) {
+    pub fn record(&self, recorder: &mut Recorder) {
         let (count, work) = &self.elements;
-        count.dispatch(*work, &kernels.reduce, &self.reduce, recorder);
-        recorder.dispatch(&kernels.sums, &self.sums, 1);
-        count.dispatch(*work, &kernels.apply, &self.apply, recorder);
+        for step in &self.steps {
+            match step.by_block {
+                true => count.dispatch(*work, &step.kernel, &step.bindings, recorder),
+                false => recorder.dispatch(&step.kernel, &step.bindings, 1),
+            }
+        }
     }
 }

@@ -6,6 +6,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::{
     groups::{Count, DIGITS, SORT_BLOCK, WorkKind},
+    kernels::variant,
     scan::{Scan, ScanKernels},
 };
 use crate::gpu::{Bindings, Buffer, Gpu, GpuError, Kernel, Recorder, shaders};
@@ -30,9 +31,10 @@ pub struct SortKernels {
 
 impl SortKernels {
     pub(super) fn new(gpu: &Gpu) -> Self {
+        let source = variant(gpu, [shaders::SORT, shaders::SORT_SIMD]);
         Self {
-            count: Kernel::new(gpu, "sort_count", shaders::SORT),
-            scatter: Kernel::new(gpu, "sort_scatter", shaders::SORT),
+            count: Kernel::new(gpu, "sort_count", source),
+            scatter: Kernel::new(gpu, "sort_scatter", source),
         }
     }
 }
@@ -130,16 +132,11 @@ impl Sort {
     }
 
     /// Records the sort.
-    pub fn record(
-        &self,
-        kernels: &SortKernels,
-        scan_kernels: &ScanKernels,
-        recorder: &mut Recorder,
-    ) {
+    pub fn record(&self, kernels: &SortKernels, recorder: &mut Recorder) {
         for pass in &self.passes {
             self.count
                 .dispatch(WorkKind::Sort, &kernels.count, &pass.count, recorder);
-            self.scan.record(scan_kernels, recorder);
+            self.scan.record(recorder);
             self.count
                 .dispatch(WorkKind::Sort, &kernels.scatter, &pass.scatter, recorder);
         }

@@ -145,7 +145,7 @@ pub(super) fn rows(raster: &Arc<Raster>) -> Result<Vec<Row>, GpuError> {
     let allowed = Allowance::of(&raster.gpu);
     let mut rows = Vec::new();
     for (kernel, antialiased, opacity) in [
-        ("luma adjoint", false, 2.02e-6),
+        ("luma adjoint", false, 2.03e-6),
         ("luma adjoint, antialiased", true, 3.21e-6),
     ] {
         let seen = [

@@ -49,7 +49,7 @@ pub fn scan_on(
     let elements = (&elements, WorkKind::Scan);
     let scan = Scan::new(gpu, kernels, &buffer, &status, elements, total)?;
     let mut recorder = Recorder::new(gpu);
-    scan.record(kernels, &mut recorder);
+    scan.record(&mut recorder);
     recorder.submit();
     Ok(Scanned {
         sums: buffer.read(gpu)?,

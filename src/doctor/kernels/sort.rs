@@ -42,7 +42,7 @@ pub fn sort_on(
     sort.keys[0].write(gpu, keys);
     sort.values[0].write(gpu, &places);
     let mut recorder = Recorder::new(gpu);
-    sort.record(kernels, scan, &mut recorder);
+    sort.record(kernels, &mut recorder);
     recorder.submit();
     let read = |buffer: &Buffer<u32>| Ok(buffer.read(gpu)?[..count].to_vec());
     Ok((read(sort.sorted_keys())?, read(sort.sorted_values())?))

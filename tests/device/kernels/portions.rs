@@ -38,15 +38,18 @@ fn cut_dispatches_give_the_same_bits() {
     }
 }
 
-/// The doctor on a device that is watched: colors and all adjoints, too.
+/// The doctor on a device that is watched, with the kernels for a GPU and those for a processor:
+/// colors and all adjoints, too.
 #[test]
 fn cut_dispatches_agree_with_the_oracle() {
-    let gpu = gpu().with_tiles_at_once(2);
-    let raster = Arc::new(Raster::new(&gpu));
-    for (topic, measure) in TOPICS {
-        if ["blend", "adjoint", "viewer"].contains(&topic) {
-            for row in measure(&raster).unwrap() {
-                assert!(row.failures.is_empty(), "{topic}: {row:?}");
+    for simd in [false, true] {
+        let gpu = gpu().with_tiles_at_once(2).with_simd(simd);
+        let raster = Arc::new(Raster::new(&gpu));
+        for (topic, measure) in TOPICS {
+            if ["blend", "adjoint", "viewer"].contains(&topic) {
+                for row in measure(&raster).unwrap() {
+                    assert!(row.failures.is_empty(), "{topic}, simd {simd}: {row:?}");
+                }
             }
         }
     }

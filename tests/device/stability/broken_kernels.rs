@@ -132,13 +132,15 @@ fn an_untouched_kernel_is_not() {
 }
 
 /// Kernels that no case runs are measured on random inputs: each of these, as a topic of the
-/// doctor, a kernel, and what is replaced in it.
+/// doctor, a kernel for processors or for GPUs, and what is replaced in it.
 fn assert_noticed(broken: &[[&'static str; 4]]) {
     for &[topic, kernel, from, to] in broken {
-        let raster = Arc::new(Raster::new(&gpu().with_broken(kernel, from, to)));
         let (_, measure) = (TOPICS.iter().find(|(name, _)| *name == topic)).expect(topic);
-        let rows = measure(&raster).unwrap();
-        let noticed = rows.iter().any(|row| !row.failures.is_empty());
+        let noticed = [true, false].into_iter().any(|simd| {
+            let gpu = gpu().with_broken(kernel, from, to).with_simd(simd);
+            let rows = measure(&Arc::new(Raster::new(&gpu))).unwrap();
+            rows.iter().any(|row| !row.failures.is_empty())
+        });
         assert!(noticed, "{kernel}: {from}");
     }
 }
@@ -402,8 +404,15 @@ fn broken_scans_and_sorts_are_noticed() {
         [
             "scan",
             "scan_sums",
-            "total = groups_for_count(carry)",
-            "total = groups_for_count(carry / 2u)",
+            "conclude(carry);",
+            "conclude(carry / 2u);",
+        ],
+        ["scan", "scan_whole", "lane < local;", "lane + 1u < local;"],
+        [
+            "sort",
+            "sort_scatter",
+            "lane_digits[at] = target_index + 1u",
+            "lane_digits[at] = target_index",
         ],
         [
             "sort",

@@ -124,6 +124,23 @@ fn compiled() -> BTreeMap<String, String> {
     }
     compile("project", "_playcanvas", &["playcanvas"]);
     compile("blend", "_rgb_playcanvas", &["rgb", "playcanvas"]);
+    // Where a processor draws.
+    for kernel in ["scan", "sort"] {
+        compile(kernel, "_simd", &["simd"]);
+    }
+    for color in ["luma", "chroma", "rgb"] {
+        compile("blend", &format!("_{color}_simd"), &[color, "simd"]);
+    }
+    compile("blend", "_depth_simd", &["luma", "depth", "simd"]);
+    let simd = |features: &[&'static str]| [features, &["simd"]].concat();
+    for (suffix, features) in [
+        ("_luma", &["luma", "geometry"][..]),
+        ("_luma_half", &["luma", "geometry", "half"]),
+        ("_figures", &["figures"]),
+        ("_rgb", &trained),
+    ] {
+        compile("blend_backward", &format!("{suffix}_simd"), &simd(features));
+    }
     kernels.files()
 }
 
@@ -157,6 +174,7 @@ impl Kernels {
             "lazy",
             "half",
             "playcanvas",
+            "simd",
             "window11",
             "window7",
             "window5",
