@@ -2,7 +2,7 @@
 // opacities on the image plane. One thread a Gaussian.
 //
 // With `mip` opacities are what they show, not what is stored: the blur spreads a
-// Gaussian, and its opacity falls by as much (docs/architecture.md).
+// Gaussian, and its opacity falls by as much (`compensation`).
 //
 // Culling tests are written so that NaN fails them.
 import package::common::constants::{ALPHA_MIN, INVISIBLE, PLANE_LOG_SCALE, PLANE_MEAN, PLANE_OPACITY, PLANE_QUAT, QUAT_NORM_MIN_SQ, STATUS_POISONED};

@@ -1,8 +1,22 @@
 // The adjoint of `project`: from centers, conics and opacities on the image
-// plane to means, quaternions, log-scales and opacity logits. Derivation in
-// docs/architecture.md. In training (`step`) Adam moves the parameters at once, and
-// their gradient is never stored; or (`lazy`) it moves those of the Gaussians that the view
-// shows, and the others keep their moments as well.
+// plane to means, quaternions, log-scales and opacity logits. In training (`step`) Adam
+// moves the parameters at once, and their gradient is never stored; or (`lazy`) it moves
+// those of the Gaussians that the view shows, and the others keep their moments as well.
+//
+// Derivation. With q̂ = q/|q|, M = R(q̂)·diag(exp s), W the world-to-camera rotation,
+// p = W m + t and u = clamp(p.xy / p.z), the 2D covariance Σ is the Gram matrix of
+//     ρx = (fx/pz)(r0 − ux r2),   ρy = (fy/pz)(r1 − uy r2),   r = rows of W M,
+// plus 0.3 I. Its determinant is |ρx × ρy|² + 0.3 (Σxx + Σyy − 0.3), a sum of positive
+// terms, so needles do not cancel to zero. With Q = Σ⁻¹ the gradient goes back through
+// dΣ = −Q dQ Q, without a squared determinant to divide by, then through ρ, r, M. Where
+// the clamp on u is active no gradient passes through u.
+//
+// Antialiased, the opacity shown is the one stored times c = |n| / √det Σ, n = ρx × ρy.
+// With g the gradient of the opacity shown, times that opacity, d log|n| = n·dn/|n|² adds
+// g (ρy × n)/|n|² to the gradient of ρx and g (n × ρx)/|n|² to that of ρy, and
+// −½ d log det Σ adds −½ g Q to that of Σ. Nothing is divided by c, and what is shown has
+// c ≥ 1/255, so all of it is bounded by some 460 g. A needle or disc seen edge-on has
+// n = 0 and is not shown.
 import package::common::constants::{INVISIBLE, PLANE_LOG_SCALE, PLANE_MEAN, PLANE_OPACITY, PLANE_QUAT, STAT_PULL, STAT_VIEWS, STATUS_OVERFLOW};
 @if(step) import package::common::descend::{descended, status};
 import package::common::geometry::footprint;

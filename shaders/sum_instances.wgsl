@@ -1,6 +1,8 @@
 // Sums the gradient records of a Gaussian's instances in emission order, then
 // turns the moments of dL/dpower into the gradients of center, conic and opacity:
 // power = ½(A dx² + C dy²) + B dx dy with d = pixel - center, and alpha = opacity·exp(-power).
+// With M the sums of dL/dpower times 1, dx, dy, dx², dx dy, dy²:
+//     ∂center = −(A Mx + B My, B Mx + C My),  ∂A = ½Mxx,  ∂B = Mxy,  ∂C = ½Myy,  ∂o = −M1/o.
 import package::common::constants::{ALPHA_MIN, STATUS_INSTANCES, STATUS_VISIBLE};
 import package::common::numeric::linear_group;
 import package::common::partials::{PARTIAL_STRIDE, PARTIAL_WORDS, PartialWord};

@@ -246,7 +246,7 @@ fn make_results(
             )));
         }
         let path = results.colored.display();
-        observe(Event::Note(format!("the photos in color are there: {path}")));
+        observe(Event::Note(format!("the photos in color are ready: {path}")));
         Ok(())
     })?;
 

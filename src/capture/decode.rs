@@ -232,7 +232,7 @@ fn open(
             return Ok((header, metadata, OpenedImage::Tiff(decoder)));
         }
         Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png)) => format,
-        _ => return Err("is neither JPEG, PNG nor TIFF; convert it (its name may stay)".into()),
+        _ => return Err("is neither JPEG, PNG nor TIFF; convert it, for example to PNG".into()),
     };
     if format == ImageFormat::Jpeg {
         let mut decoder = JpegDecoder::new(bytes).map_err(undecodable)?;

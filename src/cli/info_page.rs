@@ -215,7 +215,7 @@ pub(super) fn of_found(path: &Path, found: &Value) -> String {
         let error = found["reprojection_error"]
             .as_f64()
             .map_or(String::new(), |pixels| {
-                format!(", which photos meet within {pixels:.2} pixels (the median)")
+                format!(", median reprojection error {pixels:.2} pixels")
             });
         let extent = found["extent"].as_f64().unwrap_or(f64::NAN);
         page.about(

@@ -31,7 +31,7 @@ const MASK_USES: &[(MaskUse, &str)] = &[
     (MaskUse::Ignore, "They do not count; anything may be there"),
     (
         MaskUse::Remove,
-        "They are trained as empty: the object stands alone before black",
+        "They are trained as empty: the object is cut out before black",
     ),
 ];
 

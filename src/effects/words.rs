@@ -59,7 +59,7 @@ impl fmt::Display for Decision {
             (Decider::Trial, _) => {
                 f.write_str(&tried(self.trial.unwrap_or(0.0), self.effect.trial_gain()))
             }
-            (Decider::User, _) => f.write_str("; you said so"),
+            (Decider::User, _) => f.write_str("; set by you"),
             (Decider::Preset, Effect::Robust) => {
                 write!(f, "; a run of {ROBUST_ITERATIONS} iterations could tell")
             }
@@ -114,7 +114,7 @@ mod tests {
         };
         assert_eq!(
             asked.to_string(),
-            "exposure           off photos differ by 6.7 gray levels; 2 would be visible; you said so"
+            "exposure           off photos differ by 6.7 gray levels; 2 would be visible; set by you"
         );
         assert_eq!(
             Decision::new(Effect::Masks, None, 0.0).to_string(),

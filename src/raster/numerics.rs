@@ -1,6 +1,6 @@
 //! Accuracy settings of the rasterizer.
 //!
-//! docs/accuracy-and-time.md has the cost and gain of each (`cargo bench --bench accuracy`).
+//! docs/results.md has the cost and gain of each (`cargo bench --bench accuracy`).
 
 use serde::{Deserialize, Serialize};
 

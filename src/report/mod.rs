@@ -426,7 +426,7 @@ impl Report {
         });
         let moved = chroma.moved.map_or(String::new(), |moved| {
             let rounds = chroma.iterations;
-            format!("; round {rounds} still moved colors by {moved:.2} units")
+            format!("; colors still changed by {moved:.2} units in round {rounds}")
         });
         format!(
             "colored from {} views{truth}, export off by ΔE00 {:.2}{moved}",

@@ -29,7 +29,7 @@ pub enum ViewerError {
     #[error(transparent)]
     Store(#[from] StoreError),
     /// A port that is taken or not allowed.
-    #[error("port {port} of 127.0.0.1 cannot be had ({reason})")]
+    #[error("port {port} of 127.0.0.1 cannot be used ({reason})")]
     Port {
         /// Port on 127.0.0.1.
         port: u16,

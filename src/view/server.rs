@@ -92,7 +92,7 @@ impl Response {
 
     /// There is nothing at this path.
     pub fn not_found() -> Self {
-        Self::refused("404 Not Found", "nothing lies here")
+        Self::refused("404 Not Found", "not found")
     }
 }
 

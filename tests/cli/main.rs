@@ -31,6 +31,8 @@ mod harm;
 mod host;
 mod hostile;
 mod inspect;
+#[path = "../device/stability/literals.rs"]
+mod literals;
 mod masks;
 mod names;
 mod package;

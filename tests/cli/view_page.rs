@@ -142,7 +142,7 @@ fn a_run_is_served_and_nothing_beside_it() {
     ] {
         let (code, body) = page.get(path);
         assert_eq!(code, 404, "{path}");
-        assert_eq!(body, b"nothing lies here", "{path}");
+        assert_eq!(body, b"not found", "{path}");
     }
 }
 
@@ -241,7 +241,7 @@ fn a_port_that_is_taken_is_named() {
     assert_eq!(done.code, Some(1));
     assert!(
         done.stderr
-            .contains(&format!("port {port} of 127.0.0.1 cannot be had")),
+            .contains(&format!("port {port} of 127.0.0.1 cannot be used")),
         "{}",
         done.stderr
     );

@@ -1,18 +1,12 @@
-//! Needs of each pipeline, against limits of devices: the table in docs/gpu.md.
-//!
-//! `WRITE_DOCS=1 cargo test --test device limits` writes it.
+//! Needs of each pipeline, against limits of devices and docs/gpu.md.
 
-use std::{collections::BTreeMap, fmt::Write, fs};
+use std::{collections::BTreeMap, fs};
 
 use gs_chroma::gpu::{STORAGE_BUFFERS, WORKGROUP_BYTES, WORKGROUP_THREADS, shaders};
 use naga::{
-    AddressSpace, Module, StorageAccess,
+    AddressSpace, Module,
     valid::{Capabilities, ModuleInfo, ValidationFlags, Validator},
 };
-
-const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/gpu.md");
-const BEGIN: &str = "<!-- limits: begin -->\n";
-const END: &str = "<!-- limits: end -->\n";
 
 /// Resources that an entry point needs.
 #[derive(Clone, Copy)]
@@ -20,8 +14,6 @@ struct Needs {
     threads: u32,
     workgroup_bytes: u32,
     storage_buffers: u32,
-    /// Storage buffers among these that are written.
-    written: u32,
     uniform_buffers: u32,
     /// The highest binding number.
     last_binding: u32,
@@ -36,7 +28,6 @@ impl Needs {
             threads: point.workgroup_size.iter().product(),
             workgroup_bytes: 0,
             storage_buffers: 0,
-            written: 0,
             uniform_buffers: 0,
             last_binding: 0,
         };
@@ -49,10 +40,7 @@ impl Needs {
                 AddressSpace::WorkGroup => {
                     needs.workgroup_bytes += layouter[global.ty].size.next_multiple_of(16);
                 }
-                AddressSpace::Storage { access } => {
-                    needs.storage_buffers += 1;
-                    needs.written += u32::from(access.contains(StorageAccess::STORE));
-                }
+                AddressSpace::Storage { .. } => needs.storage_buffers += 1,
                 AddressSpace::Uniform => needs.uniform_buffers += 1,
                 _ => {}
             }
@@ -80,57 +68,27 @@ fn all() -> BTreeMap<(String, &'static str), Needs> {
     all
 }
 
-/// One row for an entry point: the most that any of its variants takes.
-fn table() -> String {
-    let mut rows: BTreeMap<String, Needs> = BTreeMap::new();
-    for ((entry, _), needs) in all() {
-        let most = rows.entry(entry).or_insert(needs);
-        most.threads = most.threads.max(needs.threads);
-        most.workgroup_bytes = most.workgroup_bytes.max(needs.workgroup_bytes);
-        most.storage_buffers = most.storage_buffers.max(needs.storage_buffers);
-        most.written = most.written.max(needs.written);
-        most.uniform_buffers = most.uniform_buffers.max(needs.uniform_buffers);
-    }
-    let mut text = String::from(
-        "| entry point | threads | workgroup memory, bytes | storage buffers | written | uniform buffers |\n\
-         |---|--:|--:|--:|--:|--:|\n",
-    );
-    for (entry, needs) in rows {
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "| `{entry}` | {} | {} | {} | {} | {} |",
-            needs.threads,
-            needs.workgroup_bytes,
-            needs.storage_buffers,
-            needs.written,
-            needs.uniform_buffers,
-        );
-    }
-    text
-}
-
-#[test]
-fn the_table_is_what_the_kernels_take() {
-    let docs = fs::read_to_string(DOCS).expect("docs/gpu.md");
-    let (before, rest) = docs.split_once(BEGIN).expect("where the table begins");
-    let (written, after) = rest.split_once(END).expect("where it ends");
-    let table = table();
-    if std::env::var_os("WRITE_DOCS").is_some() {
-        fs::write(DOCS, [before, BEGIN, &table, END, after].concat()).expect("docs are writable");
-    } else {
-        assert_eq!(written, table, "WRITE_DOCS=1 writes it anew");
-    }
-}
-
-/// `Gpu` requests exactly the needs of the largest kernels.
+/// `Gpu` requests exactly the needs of the largest kernels, and the page lists them.
 #[test]
 fn a_device_is_asked_for_what_the_kernels_take_and_no_more() {
     let all = all();
-    let most = |of: fn(&Needs) -> u32| all.values().map(of).max();
-    assert_eq!(most(|needs| needs.storage_buffers), Some(STORAGE_BUFFERS));
-    assert_eq!(most(|needs| needs.workgroup_bytes), Some(WORKGROUP_BYTES));
-    assert_eq!(most(|needs| needs.threads), Some(WORKGROUP_THREADS));
+    let most = |of: fn(&Needs) -> u32| all.values().map(of).max().expect("kernels");
+    let [storage, bytes, threads, uniform] = [
+        most(|needs| needs.storage_buffers),
+        most(|needs| needs.workgroup_bytes),
+        most(|needs| needs.threads),
+        most(|needs| needs.uniform_buffers),
+    ];
+    assert_eq!(storage, STORAGE_BUFFERS);
+    assert_eq!(bytes, WORKGROUP_BYTES);
+    assert_eq!(threads, WORKGROUP_THREADS);
+
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/gpu.md");
+    let page = fs::read_to_string(page).expect("the page");
+    let (thousands, rest) = (bytes / 1_000, bytes % 1_000);
+    let row =
+        format!("a kernel takes** | {threads} | {thousands},{rest:03} | {storage} | {uniform} |");
+    assert!(page.contains(&row), "docs/gpu.md lacks {row}");
 }
 
 /// Beyond what WebGPU promises are storage buffers and workgroup memory, and no more; both

@@ -2,6 +2,8 @@
 
 use std::{collections::BTreeSet, fs, path::Path};
 
+use super::literals::{literals, without_tests};
+
 /// The folders and files right below `src`, from top to bottom. What stands on one floor
 /// does not know each other.
 const FLOORS: [&[&str]; 15] = [
@@ -176,46 +178,6 @@ fn files_are_read_and_written_in_one_place() {
         &mut found,
     );
     assert!(found.is_empty(), "{found:?}");
-}
-
-/// String literals of code.
-fn literals(code: &str) -> Vec<&str> {
-    let mut found = Vec::new();
-    let mut rest = code;
-    while let Some(at) = rest.find(['"', '/', '\'']) {
-        let (before, tail) = rest.split_at(at);
-        let length = match tail.as_bytes() {
-            [b'/', b'/', ..] => tail.find('\n').unwrap_or(tail.len()),
-            [b'\'', b'\\', _, b'\'', ..] => 4,
-            [b'\'', _, b'\'', ..] => 3,
-            [b'"', ..] => {
-                let mut escaped = false;
-                let end = match before.ends_with("r#") {
-                    true => tail[1..].find("\"#"),
-                    false => tail[1..].find(|c| {
-                        let ends = c == '"' && !escaped;
-                        escaped = c == '\\' && !escaped;
-                        ends
-                    }),
-                };
-                let end = end.map_or(tail.len(), |end| end + 1);
-                found.push(&tail[1..end]);
-                tail.len().min(end + 1)
-            }
-            _ => 1,
-        };
-        rest = &tail[length..];
-    }
-    found
-}
-
-/// Code before the tests in a file.
-pub(super) fn without_tests(text: &str) -> &str {
-    let marks = text.match_indices("#[cfg(test)]\n");
-    let mut tests = marks.map(|(at, mark)| (at, text[at + mark.len()..].lines().next()));
-    let inline = |line: &str| line.contains("mod ") && line.ends_with('{');
-    let tests = tests.find(|(_, line)| line.is_some_and(inline));
-    &text[..tests.map_or(text.len(), |(at, _)| at)]
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::{
     path::Path,
 };
 
-use super::architecture::without_tests;
+use super::literals::without_tests;
 
 /// `clap` tells how a command is used from the description of the whole program, which holds all
 /// commands; these refuse options that do not go together, or take options of those that do.

@@ -5,6 +5,7 @@ mod architecture;
 mod broken_kernels;
 mod cases;
 mod circles;
+mod literals;
 mod poison;
 mod poison_capture;
 mod shader_lint;
