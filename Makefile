@@ -54,7 +54,7 @@ lint:
 	@$(MAKE) --no-print-directory prose
 
 # Names and tables are no prose, nor is the style guide's list of words.
-PROSE = README.md $(shell find docs -name '*.md' -not -path 'docs/lab/*' -not -name hard-cases.md -not -name style.md)
+PROSE = README.md $(shell find docs -name '*.md' -not -name style.md)
 
 prose:
 	@if command -v proselint >/dev/null; then proselint check --config docs/proselint.json $(PROSE); \
