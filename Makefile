@@ -53,7 +53,7 @@ lint:
 	cargo clippy --all-targets -- -D warnings
 	@$(MAKE) --no-print-directory prose
 
-# Names and tables are no prose, nor is the style guide's list of words.
+# The style guide's list of words is no prose.
 PROSE = README.md $(shell find docs -name '*.md' -not -name style.md)
 
 prose:
