@@ -1,7 +1,7 @@
 //! NumPy's files of 32-bit floats: version 1.0, little-endian, in C order.
 //!
 //! Only the header that NumPy itself writes is read. A general reader takes any Python
-//! literal there, and does not end with one that nests deeply (docs/decisions/03-dependencies.md).
+//! literal there, and does not end with one that nests deeply (docs/decisions/platform.md).
 //!
 //! Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
 

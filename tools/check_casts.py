@@ -8,7 +8,7 @@ saturation and cast of those in training, and that mean is not the truth. For ea
 (default $SCENES or scenes) this gives the held-out photos that mean, and takes their a/b error. To what is
 expected of ours is added, as if the two were independent, what is left with the photos themselves
 as teacher; that, and what ours and RGB splats reached, is read from the table that
-check_color.py printed into RESULTS (default docs/lab/09-colors.md). An estimate, no bound: another method may
+check_color.py printed into RESULTS, as Markdown or CSV (default docs/experiments/colors.csv). An estimate, no bound: another method may
 err less on the photos themselves. Prints it beside what was reached, and draws it as a share of the teacher's own error for several strengths of the casts and
 many draws of them. No scene is trained. Needs numpy, Pillow and matplotlib.
 """
@@ -16,6 +16,7 @@ many draws of them. No scene is trained. Needs numpy, Pillow and matplotlib.
 from __future__ import annotations
 
 import argparse
+import csv
 import os
 import sys
 from dataclasses import dataclass
@@ -61,7 +62,8 @@ def reached(results: Path) -> dict[str, Reached]:
     """What the table of check_color.py says, by scene."""
     rows = {}
     for text in results.read_text(encoding="utf-8").splitlines():
-        cells = [cell.strip(" *") for cell in text.strip("|").split("|")]
+        row = text.strip("|").split("|") if text.startswith("|") else next(csv.reader([text]), [])
+        cells = [cell.strip(" *") for cell in row]
         if len(cells) >= len(HEAD) - 1 and cells[1] in ("oracle", "unsteady"):
             rows[cells[0], cells[1]] = dict(zip(HEAD, cells))
     scenes = {}
@@ -137,7 +139,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--svg", type=Path, required=True)
     parser.add_argument("--data", type=Path, default=Path(os.environ.get("SCENES", "scenes")))
-    parser.add_argument("--results", type=Path, default=Path("docs/lab/09-colors.md"))
+    parser.add_argument("--results", type=Path, default=Path("docs/experiments/colors.csv"))
     parser.add_argument("--seeds", type=int, default=20)
     arguments = parser.parse_args()
     print("| scene | the mean view | expected of ours | ours | / teacher's: expected, ours (≤ 0.4) | / RGB splats': expected, ours (≤ 0.6) |")

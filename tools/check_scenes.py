@@ -19,7 +19,7 @@ import sys
 import time
 from pathlib import Path
 
-# Scene, longer side in pixels, cap on Gaussians: the settings of the yardstick in docs/lab/09-colors.md.
+# Scene, longer side in pixels, cap on Gaussians.
 SCENES = [
     ("tiny-brighton", 320, 10_000),
     ("tiny-banana", 320, 20_000),

@@ -1,8 +1,7 @@
-"""Draws the fronts of several sweeps beside each other and prints what each knob costs:
-docs/images/fronts.svg and the tables of docs/lab/04-presets.md.
+"""Draws the fronts of several sweeps beside each other and prints what each knob costs.
 
     gs-chroma tradeoff SCENE -o runs/SCENE-tradeoff          # for each scene
-    python3 tools/plot_fronts.py runs/*-tradeoff/tradeoff.json -o docs/images/fronts.svg
+    python3 tools/plot_fronts.py runs/*-tradeoff/tradeoff.json -o fronts.svg
 
 Needs matplotlib (tools/requirements.txt). For one scene `tradeoff` draws a page by itself.
 """

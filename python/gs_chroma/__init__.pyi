@@ -97,7 +97,7 @@ class Camera:
         """The same view at another size."""
 
 class LoadOptions(TypedDict, total=False):
-    """Options of loading photos; docs/run-folder.md describes them (`capture.load`)."""
+    """Options of loading photos; docs/schemas/report.schema.json describes them (`capture`)."""
 
     max_side: int | None
     holdout: bool
@@ -225,7 +225,7 @@ class Splats:
     def __len__(self) -> int: ...
 
 class LumaSettings(TypedDict, total=False):
-    """Settings in the place of the preset's; docs/run-folder.md describes them."""
+    """Settings in the place of the preset's; docs/schemas/report.schema.json describes them (`luma.settings`)."""
 
     iterations: int
     max_splats: int
@@ -276,7 +276,7 @@ def fit(
     """
 
 class ChromaSettings(TypedDict, total=False):
-    """Settings of the solver; docs/run-folder.md describes them (`chroma.settings`)."""
+    """Settings of the solver; docs/schemas/report.schema.json describes them (`chroma.settings`)."""
 
     solver: Literal["irls", "adam"]
     rounds: int
@@ -355,7 +355,7 @@ def device() -> str:
 def evaluate(
     run: _Path | None = None, *, progress: _Report | None = None, **options: Any
 ) -> dict[str, Any]:
-    """Measures a colored run, and gives what eval.json holds (docs/run-folder.md).
+    """Measures a colored run, and gives what eval.json holds (docs/schemas/eval.schema.json).
 
     `options` are those of `gs-chroma eval`, with `_` for `-`: `teacher="ddcolor-tiny",
     baselines=True`. The run is by default the newest below runs/.

@@ -12,7 +12,7 @@ Report = Callable[[_native.Progress], object]
 
 
 def evaluate(run: Any = None, *, progress: Report | None = None, **options: Any) -> dict[str, Any]:
-    """Measures a colored run, and gives what eval.json holds (docs/run-folder.md).
+    """Measures a colored run, and gives what eval.json holds (docs/schemas/eval.schema.json).
 
     `options` are those of `gs-chroma eval`, with `_` for `-`: `teacher="ddcolor-tiny",
     baselines=True`. The run is by default the newest below runs/.

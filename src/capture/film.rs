@@ -43,7 +43,6 @@ pub struct Film {
     /// When each frame is shown, in seconds after `start`; `None` where they follow each other at
     /// the frame rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(test, schemars(skip))]
     pub times: Option<Vec<f64>>,
     /// The pictures as the film's file has them; `None` where an earlier version prepared them.
     #[serde(default, skip_serializing_if = "Option::is_none")]

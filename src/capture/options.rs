@@ -36,9 +36,7 @@ pub struct LoadOptions {
     #[serde(default)]
     pub left_out: Vec<Rejected>,
     /// The photos of a part of the capture, where it is not all of it.
-    // docs/large-scenes.md has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(test, schemars(skip))]
     pub chosen: Option<Chosen>,
 }
 
@@ -87,6 +85,7 @@ pub struct Rejected {
 /// Photos of a part of a capture, by their paths below `images/`; no other photo of it is used,
 /// and no point that none of these shows.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Chosen {
     /// Those that are trained on.

@@ -36,7 +36,7 @@ const PLAIN_ROUNDS: usize = 4;
 const PLAIN_MOVES: f64 = 2.0;
 
 /// Rounds after which the colors are anchored at the earliest, and not before the loss levels
-/// off: what these have not settled is what the pictures decide badly (docs/decisions/38-rounds-and-anchors.md).
+/// off: what these have not settled is what the pictures decide badly (docs/decisions/chroma.md).
 /// Until then no round counts as settled.
 const FREE_ROUNDS: usize = 8;
 

@@ -38,10 +38,10 @@ pub struct LbfgsParameters {
 
 /// Factor of ridge and bound of harmonics beyond the constant one. Photos see a
 /// Gaussian from one side, where many fields of degree 3 show the same: of these the one is found
-/// whose view dependence, weighted so, is least (docs/lab/07-chroma-solver.md).
+/// whose view dependence, weighted so, is least (docs/experiments.md).
 pub const REST: f64 = 20.0;
 
-/// Twin of `MEMORY`: pairs that are remembered. Eight do no better (docs/lab/07-chroma-solver.md).
+/// Twin of `MEMORY`: pairs that are remembered. Eight do no better.
 pub(super) const MEMORY: usize = 5;
 
 /// Twin of `RHO`: scalars before those of the pairs, of which each has two.

@@ -14,7 +14,7 @@ const SEEN: f32 = 1.0;
 const SURE: f32 = 20.0;
 
 /// The weight of an example falls with this power of the squared distance; 2 is blunt, 6 no
-/// better (docs/lab/07-chroma-solver.md).
+/// better.
 const FALL: i32 = 4;
 
 /// Squared distance below which examples are as good as the same.

@@ -15,12 +15,12 @@ use crate::splats::{ShField, sh};
 const VIEWS: usize = 16;
 
 /// The largest factor. What lacks more lacks it in places that one factor does not mend, and
-/// the others pay for it (docs/lab/07-chroma-solver.md).
+/// the others pay for it.
 const MOST: f64 = 1.25;
 
 /// Views that agree on this share agree on all: even photos, which contradict each other in
 /// nothing, show a point's neighbors in part, and agree on 0.95 to 0.99; a real network on 0.91
-/// to 0.97, one with casts and patches on half (docs/lab/07-chroma-solver.md).
+/// to 0.97, one with casts and patches on half.
 const STEADY: f64 = 0.9;
 
 /// Multiplies the colors by what they lack of the teachers' strength, 1 to 1.25, and says by how

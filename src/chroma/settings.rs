@@ -36,7 +36,7 @@ pub struct ChromaSettings {
     /// Coarser scales of Adam beside the full one.
     ///
     /// Each is half as large as the last. The paper leaves their number open. By least squares,
-    /// coarser scales make colors paler (docs/lab/07-chroma-solver.md, coarser scales).
+    /// coarser scales make colors paler (docs/experiments.md).
     pub scales: u32,
     /// Weight of Adam's agreement with the next coarser scale.
     ///
@@ -99,18 +99,18 @@ pub struct ChromaSettings {
 
 /// In pixels. Less than it says, for the loss of a residual does not grow with its square as
 /// this does: a Gaussian of 30 units is held like one that a third of a pixel wants gray. A
-/// hundredth of it fits the teacher better and held-out photos worse (docs/lab/07-chroma-solver.md).
+/// hundredth of it fits the teacher better and held-out photos worse.
 const RIDGE: f64 = 0.01;
 
 /// A twentieth: along directions in which the loss bends twenty times less than in those that are
-/// decided best, colors go half of their way (docs/lab/07-chroma-solver.md).
+/// decided best, colors go half of their way.
 const ANCHOR: f64 = 0.05;
 
 /// By then anchored colors have come to rest: four times as many change the pictures by less than
-/// 0.1 ΔE00 (docs/lab/07-chroma-solver.md).
+/// 0.1 ΔE00 (docs/experiments.md).
 const ROUNDS: usize = 12;
 
-/// A tenth of what is just seen (docs/lab/07-chroma-solver.md).
+/// A tenth of what is just seen.
 const SETTLED: f64 = 0.1;
 
 impl ChromaSettings {
@@ -128,7 +128,7 @@ impl ChromaSettings {
         }
     }
 
-    /// Reweighted least squares; docs/lab/07-chroma-solver.md has what each choice brings.
+    /// Reweighted least squares; docs/experiments.md has what each choice brings.
     pub fn irls() -> Self {
         Self {
             solver: SolverKind::Irls,

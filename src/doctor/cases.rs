@@ -2,7 +2,7 @@
 //!
 //! Most put one troublesome Gaussian, number [`ODD`], into the middle of forty
 //! ordinary ones. `seen` are the worst errors measured on the reference device;
-//! docs/hard-cases.md is made from this table.
+//! docs/experiments/hard-cases.csv is made from this table.
 
 use crate::oracle::{
     random::{

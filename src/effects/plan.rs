@@ -24,16 +24,16 @@ const TRIAL_GAIN_OF_EXPOSURES: f64 = 0.3;
 
 /// Share of places at which one view disagrees with all others from which on photos are
 /// taken to have defects: clean photos stay below 0.13 %, 1.5 % of dust gives 0.24 to 3 %
-/// (docs/decisions/33-outliers.md).
+/// (docs/decisions/effects.md).
 const OUTLIER_SHARE: f64 = 0.002;
 
 /// In a shorter run most of what is far off is only not learned yet, and leaving it out
-/// costs more than the defects do (docs/decisions/33-outliers.md).
+/// costs more than the defects do (docs/decisions/effects.md).
 pub(super) const ROBUST_ITERATIONS: usize = 1_200;
 
 /// Ratio of the sampling rates of near and far views from which on a blur of one size
 /// makes far views too thick or near ones too faint: an octave. Below 1.5 it gains nothing at
-/// full size, at 4.9 it does (docs/lab/12-effects.md).
+/// full size, at 4.9 it does (docs/experiments.md).
 const SAMPLING_SPREAD: f64 = 2.0;
 
 /// Share of the photos' area from which on something behind the scene may be worth Gaussians;
@@ -45,8 +45,7 @@ const BACKGROUND_SHARE: f64 = 0.002;
 const DIRECTION_LEVELS: f64 = 5.0;
 
 /// And in a run of as many iterations, which learns from less: on eight of nine scenes with more
-/// than this, matt ones too, it gained 0.02 to 0.22 dB, on one it lost 0.01
-/// (docs/lab/12-effects.md).
+/// than this, matt ones too, it gained 0.02 to 0.22 dB, on one it lost 0.01.
 const LONG_RUN: usize = 2_400;
 const DIRECTION_LEVELS_LONG: f64 = 2.0;
 
@@ -131,12 +130,12 @@ impl Effect {
             // Harmonics: only long runs learn them:
             // trials said -0.06 to 0.04 dB of what gained up to 0.14. Outliers: what is far off is
             // told from what is not learned yet in long runs only, and a wrong decision costs
-            // 0.05 dB (docs/lab/12-effects.md).
+            // 0.05 dB (docs/experiments.md).
             _ => None,
         }
     }
 
-    /// Cost while it is on (docs/lab/12-effects.md has the measurements).
+    /// Cost while it is on (docs/effects.md).
     pub fn cost(self) -> &'static str {
         match self {
             Self::Lens => "nothing once photos are read",

@@ -8,7 +8,7 @@
 //! with s the scene's colors and c how far these are believed; d what the scene differs from the
 //! teacher around; p the colors of the photo before, where these are known. So there is no seam
 //! where the scene ends (as in Pérez, Gangnet and Blake, *Poisson Image Editing*, SIGGRAPH 2003),
-//! and what blurred geometry loses comes back (docs/decisions/48-frames.md). With a teacher w is 1, but
+//! and what blurred geometry loses comes back (docs/decisions/films.md). With a teacher w is 1, but
 //! nearly 0 where it says something else than the scene beyond a cast: there the scene is taken as
 //! it is. Without one t = 0, and w = exp(−δ²/2σ²), δ the difference of the neighbors' gray: colors spread along
 //! even lightness and stop at edges (as in Levin, Lischinski and Weiss, *Colorization using

@@ -2,7 +2,7 @@
 //! device carries the plan out (`shaders/densify.wgsl`).
 //!
 //! As in 3DGS, Gaussians that the loss pulls at are divided and faint ones
-//! removed. What differs, and why, is in docs/decisions/22-densification.md: the pull does not
+//! removed. What differs, and why, is in docs/decisions/training.md: the pull does not
 //! cancel between pixels (AbsGS, Ye et al. 2024), every division is a split that
 //! keeps the first two moments, and a set grows by a bounded share at a time.
 

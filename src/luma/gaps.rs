@@ -31,7 +31,7 @@ const BEYOND: [f64; 2] = [0.7, 1.4];
 const PLANE: usize = 12;
 
 /// Correlation with the photos nearby, the mean of the best two, from which a depth is believed
-/// (docs/lab/16-ends-and-gaps.md).
+/// (docs/experiments.md).
 const CORRELATED: f64 = 0.7;
 
 /// A point that was found.

@@ -27,7 +27,7 @@ const SPAN: usize = 2 * REACH as usize + 1;
 const TEXTURE: f64 = 4.0;
 
 /// A photo denies a match where its patch has less than this share of the texture: a third drops
-/// most wrong ones along silhouettes, few on a lawn (docs/lab/16-ends-and-gaps.md).
+/// most wrong ones along silhouettes, few on a lawn (docs/experiments.md).
 const PLAIN: f64 = 1.0 / 3.0;
 
 /// Largest slant: relative change of 1 / depth per pixel. A steeper plane comes from points on

@@ -12,7 +12,7 @@ const RECENT_MIN: usize = 20;
 const WARM_UP: usize = 16;
 
 /// Share of an iteration's cost that grows with the number of Gaussians; the rest grows with the
-/// pixels. Measured on a software adapter at the presets' sizes (docs/lab/13-performance.md);
+/// pixels. Measured on a software adapter at the presets' sizes (docs/experiments.md);
 /// elsewhere it affects only the first estimates, which are corrected as training goes on.
 const SHARE_OF_SPLATS: f64 = 0.5;
 

@@ -44,8 +44,7 @@ impl Preset {
                 sh_degree: 0,
                 ..LumaSettings::new(700)
             },
-            // Twice the Gaussians in half of the iterations are better and no slower
-            // (docs/lab/04-presets.md).
+            // Twice the Gaussians in half of the iterations are better and no slower.
             Self::Balanced => LumaSettings {
                 max_splats: 2_000_000,
                 sh_degree: 2,

@@ -61,7 +61,7 @@ impl Schedule {
     /// The paper's schedule is written for 15,000 iterations; a shorter run passes
     /// through the same phases in proportion. There are no opacity resets, splitting
     /// ends with four fifths of the run, and harmonics come sooner than every 1,000
-    /// iterations (measured in docs/lab/03-densification.md).
+    /// iterations.
     fn own(settings: &LumaSettings) -> Self {
         let iterations = settings.iterations;
         let share = |of_paper: usize| (of_paper * iterations).div_ceil(PAPER_ITERATIONS);
@@ -179,7 +179,7 @@ pub const SETTLED: f64 = 0.1;
 /// Share of the iterations after which surroundings are drawn. From the first on, Gaussians in
 /// front of them would stay thin and lend them their mean gray, which other views show to be
 /// wrong; the later they come, the longer have those at the border tried to show what lies
-/// beyond it (docs/lab/16-ends-and-gaps.md).
+/// beyond it (docs/experiments.md).
 const SURROUND_AT: f64 = 0.3;
 
 /// A run that is made to settle early takes so many more iterations, as a share of those

@@ -48,7 +48,7 @@ impl Default for LearningRates {
     /// Beside the 3DGS rates, which were tuned for 30,000 iterations, sizes and attitudes
     /// learn twice as fast, colors four times, opacities half as fast, and the means' rate
     /// falls by half a decade instead of two: there is little time to move in (measured in
-    /// docs/lab/03-densification.md).
+    /// docs/experiments.md).
     fn default() -> Self {
         Self {
             means: [1.6e-4, 4.8e-5],
@@ -100,7 +100,7 @@ impl LearningRates {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum DensifyRules {
-    /// Ours (docs/decisions/22-densification.md).
+    /// Ours (docs/decisions/training.md).
     #[default]
     Own,
     /// Those of 3DGS (Kerbl et al. 2023), as published.

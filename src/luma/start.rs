@@ -14,12 +14,11 @@ use crate::{
 };
 
 /// At most so large a share of the Gaussians is there from the start: growth sees where photos
-/// are not met, and places the others better (docs/lab/03-densification.md).
+/// are not met, and places the others better (docs/experiments.md).
 const FIRST_SHARE: f64 = 0.75;
 
 /// At most so large a share of the Gaussians starts where COLMAP has no point, as numerator and
-/// denominator: half of it gained less on the lawn of the bundled scene, more cost elsewhere
-/// (docs/lab/16-ends-and-gaps.md).
+/// denominator: half of it gained less on the lawn of the bundled scene, more cost elsewhere.
 const GAPS_PARTS: [usize; 2] = [3, 10];
 
 /// At most one in so many Gaussians is one of the surroundings.
@@ -106,7 +105,7 @@ pub fn first_points(
         position: point.position.as_vec3().to_array(),
         gray: point.gray,
         // Not the distance to its neighbors: what stands alone may be wrong, and would be wide
-        // (docs/lab/16-ends-and-gaps.md).
+        // (docs/experiments.md).
         spacing: Some(point.width as f32),
     };
     let found = found.iter().map(started);
@@ -164,7 +163,7 @@ fn at_degree(field: &ShField, count: usize, degree: u32) -> ShField {
 
 /// Keeps at most `max` Gaussians: a cap is a cap. Small ones stand close together and for each
 /// other, so the chance to stay goes with the root of the size, the geometric mean of the axes,
-/// and the choice is even along a Z-order curve (docs/lab/03-densification.md).
+/// and the choice is even along a Z-order curve (docs/experiments.md).
 fn truncate(splats: &mut Splats, max: usize) {
     if splats.len() > max {
         let root = |axes: &[f32; 3]| {

@@ -22,8 +22,7 @@ use crate::{
 /// Share of the run's time that all trainings of a trial may take.
 const SHARE: f64 = 0.15;
 
-/// Fixed cost of an iteration, in pixels: small dispatches wait for each other
-/// (docs/lab/12-effects.md has the measurements).
+/// Fixed cost of an iteration, in pixels: small dispatches wait for each other.
 const BESIDE_PIXELS_ON_A_CPU: f64 = 9_000.0;
 const BESIDE_PIXELS_ON_A_GPU: f64 = 730_000.0;
 

@@ -1,7 +1,7 @@
 //! Projection of one Gaussian: mean, screen covariance, conic, opacity.
 //!
 //! EWA splatting (Zwicker et al. 2001) as 3D Gaussian splatting uses it
-//! (Kerbl et al. 2023), with the guards of `docs/hard-cases.md`; antialiased as in
+//! (Kerbl et al. 2023), with the guards of `docs/limits.md`; antialiased as in
 //! Mip-Splatting (Yu et al. 2024).
 
 use super::Number;

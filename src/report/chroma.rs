@@ -70,6 +70,7 @@ pub struct ChromaReport {
     /// Mean of Adam's last iterations, or before the last round of least squares. JSON has `null`
     /// for what is not finite.
     #[serde(deserialize_with = "number_or_nan")]
+    #[cfg_attr(test, schemars(with = "Option<f64>"))]
     pub loss: f64,
     /// Wall time.
     pub seconds: ChromaSeconds,
@@ -96,9 +97,7 @@ pub struct ChromaReport {
     /// Each of these views.
     pub views: Vec<ColorView>,
     /// Device time of each kernel, with `--timings`.
-    // Its table is one of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(test, schemars(skip))]
     pub timings: Option<Vec<KernelReport>>,
 }
 

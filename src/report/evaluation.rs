@@ -1,4 +1,4 @@
-//! Results of `eval`: `eval.json` and its tables. docs/run-folder.md describes every key.
+//! Results of `eval`: `eval.json` and its tables. docs/schemas describes every key.
 
 use std::fmt;
 

@@ -1,5 +1,5 @@
 //! Reports of a run: `report.json`, the contact sheet, and the findings of `eval`.
-//! docs/run-folder.md describes every key.
+//! docs/schemas describes every key.
 
 mod chroma;
 mod contact_sheet;
@@ -232,6 +232,7 @@ pub struct LumaReport {
     ///
     /// Of grays from 0 to 1. JSON has `null` for what is not finite.
     #[serde(deserialize_with = "number_or_nan")]
+    #[cfg_attr(test, schemars(with = "Option<f64>"))]
     pub loss: f64,
     /// Condition that ends the run, by `--time-limit` or `--target-psnr`.
     ///
@@ -267,9 +268,7 @@ pub struct LumaReport {
     /// Each held-out view.
     pub held_out_views: Vec<LumaView>,
     /// Device time of each kernel, with `--timings`.
-    // Its table is one of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(test, schemars(skip))]
     pub timings: Option<Vec<KernelReport>>,
 }
 

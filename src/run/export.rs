@@ -47,6 +47,7 @@ pub struct ExportOptions {
 
 /// Result of `export`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Exported {
     /// File that was written.
     pub file: PathBuf,

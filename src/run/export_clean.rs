@@ -13,11 +13,12 @@ use crate::{
 };
 
 /// A Gaussian that fills less of every training view than this many pixels is removed. The change
-/// is below the rounding of a PNG file; half a pixel is visible (docs/lab/16-ends-and-gaps.md).
+/// is below the rounding of a PNG file; half a pixel is visible (docs/decisions/files.md).
 const NEEDED: f32 = 0.1;
 
 /// Number of removed Gaussians, and the effect on renders.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Cleaned {
     /// Removed Gaussians.
     pub dropped: usize,

@@ -26,7 +26,9 @@ const MOST_SIDE: u32 = 640;
 /// Agreement of a viewer with `gs-chroma render`: mean PSNR in dB over the held-out cameras, or
 /// over all if none is held out.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ViewerCameras {
+    /// The viewer.
     pub viewer: Viewer,
     /// PSNR of the scene as in the run.
     pub before: f64,

@@ -32,6 +32,7 @@ const FIELD_OF_VIEW: f64 = 50.0;
 
 /// Loss of a format.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Loss {
     /// Peak signal-to-noise ratio of the pictures, against those of what was written, in dB;
     /// none where nothing was measured.

@@ -31,6 +31,8 @@ pub use export::{ExportOptions, Exported, export};
 pub use export_clean::Cleaned;
 pub use export_viewer::ViewerCameras;
 pub use fit::{FitRequest, Init, fit};
+#[cfg(test)]
+pub(crate) use frames::ChangeReport;
 pub use frames::{Frames, FramesOptions, frames};
 pub(crate) use frames::{PlainFramesOptions, frames_without_scene};
 pub use info::info;

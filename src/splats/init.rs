@@ -9,7 +9,7 @@ const NEIGHBORS: usize = 3;
 /// Standard deviation of an initial Gaussian as a share of the distance to its
 /// neighbors, and its opacity. 3DGS begins with 1 and 0.1: a fog that must first
 /// find its surface. Smaller and denser ones stand on it from the start (figures
-/// in docs/decisions/22-densification.md).
+/// in docs/decisions/training.md).
 const INITIAL_WIDTH: f32 = 0.5;
 const INITIAL_OPACITY: f64 = 0.5;
 

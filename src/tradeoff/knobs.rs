@@ -30,8 +30,7 @@ pub(super) struct Knob {
     power: f64,
     /// Share of the stage's time that goes by this work.
     share: f64,
-    /// Range of what twice the work changed, in dB of luma's error or of that between views
-    /// (docs/lab/04-presets.md#what-a-point-tells).
+    /// Range of what twice the work changed, in dB of luma's error or of that between views.
     pub spread: f64,
 }
 

@@ -1,5 +1,5 @@
 //! A sweep as `tradeoff.json` holds it, and what its points are judged by.
-//! docs/tradeoff.md describes every key.
+//! docs/schemas/tradeoff.schema.json describes every key.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,10 @@ pub(super) const BASES: f64 = 4.0;
 
 /// `tradeoff.json`: a sweep, finished or not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Tradeoff {
+    /// Layout of the file; raised when a key changes its meaning.
+    ///
     /// [`TRADEOFF_VERSION`].
     pub version: u32,
     /// Version of the program.
@@ -20,8 +23,9 @@ pub struct Tradeoff {
     pub subject: Subject,
     /// Adapter and driver, once the first point has run.
     pub device: Option<String>,
-    /// Wall seconds that the points may take together; `None`: [`BASES`] times what the bases
-    /// took.
+    /// Wall seconds that the points may take together; `None`: four times what the bases took.
+    ///
+    /// [`BASES`].
     pub budget: Option<f64>,
     /// Every point, in the order in which they were found.
     pub points: Vec<SweepPoint>,
@@ -29,6 +33,7 @@ pub struct Tradeoff {
 
 /// Subject of a sweep; a folder holds points of one subject only.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Subject {
     /// The COLMAP folder, absolute.
     pub scene: String,
@@ -40,6 +45,7 @@ pub struct Subject {
 
 /// One choice of settings, and its outcome.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SweepPoint {
     /// Name of its run folder under `points/`, or of that and a place along its curve.
     pub name: String,
@@ -63,6 +69,7 @@ pub struct SweepPoint {
 
 /// Stage that a point measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum PointStage {
     /// Geometry and luma.
@@ -78,14 +85,17 @@ impl PointStage {
 
 /// A knob and where it stands.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Setting {
     /// Name of the setting, as for `--knobs`.
     pub knob: String,
+    /// Value of it.
     pub value: String,
 }
 
 /// Figures from a point's reports. Means are over the held-out views.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Outcome {
     /// Iterations of stage 1.
     pub iterations: usize,

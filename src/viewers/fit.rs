@@ -51,7 +51,7 @@ pub struct FitSettings {
 }
 
 impl FitSettings {
-    /// Settings of the export: docs/lab/15-viewers-and-files.md has the experiments.
+    /// Settings of the export.
     pub const DEFAULT: Self = Self {
         iterations: 400,
         log_scales: 1e-2,

@@ -24,6 +24,7 @@ use crate::{
 
 /// A viewer that scenes are fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Viewer {
     /// Spark, set as 3D Gaussian splatting draws: every Gaussian to its end, blurred by 0.3 px².

@@ -1,87 +1,138 @@
-//! docs/run-folder.md names everything that a run folder holds.
+//! docs/schemas and docs/run-folder.md describe everything that a run folder holds.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, fs, path::Path};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::shared::{onnx, place_with_run};
 
+const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs");
+
 /// The page.
-pub fn page() -> String {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/run-folder.md");
-    std::fs::read_to_string(path).expect("the page")
+fn page() -> String {
+    fs::read_to_string(format!("{DOCS}/run-folder.md")).expect("the page")
 }
 
-/// Paths of all keys, such as `luma.seconds.train`; of a list, those of its items.
-fn collect_keys(value: &Value, path: &str, keys: &mut BTreeSet<String>) {
-    match value {
-        Value::Object(map) => {
-            for (name, value) in map {
-                let path = if path.is_empty() {
-                    name.clone()
-                } else {
-                    format!("{path}.{name}")
-                };
-                collect_keys(value, &path, keys);
-                keys.insert(path);
-            }
-        }
-        Value::Array(items) => items.iter().for_each(|item| collect_keys(item, path, keys)),
-        _ => {}
+/// Checks a value against docs/schemas/NAME.schema.json.
+pub fn conforms(value: &Value, name: &str) {
+    if let Err(fault) = fault(value, name) {
+        panic!("{name}.schema.json: {fault}");
     }
 }
 
-#[test]
-fn every_key_of_a_report_and_no_other() {
-    let report = place_with_run().report("runs/scene");
-    are_documented(&report, "## report.json");
+/// What in a value contradicts a schema, or is not in it.
+fn fault(value: &Value, name: &str) -> Result<(), String> {
+    let path = format!("{DOCS}/schemas/{name}.schema.json");
+    let text = fs::read_to_string(&path).expect("a schema");
+    let root: Value = serde_json::from_str(&text).expect("JSON");
+    check(value, &root, &root, "")
+}
+
+/// The part of JSON Schema that docs/schemas uses; keys that no schema has are faults, too.
+fn check(value: &Value, schema: &Value, root: &Value, path: &str) -> Result<(), String> {
+    if let Some(link) = schema["$ref"].as_str() {
+        let place = link.trim_start_matches('#');
+        let mut whole = root.pointer(place).expect("a definition").clone();
+        // The tag of a variant is beside the reference to the rest of it.
+        if let Some(own) = schema["properties"].as_object() {
+            let all = whole["properties"].as_object_mut().expect("an object");
+            all.extend(own.clone());
+        }
+        return check(value, &whole, root, path);
+    }
+    for key in ["anyOf", "oneOf"] {
+        if let Some(all) = schema[key].as_array() {
+            let mut faults = vec![];
+            for one in all {
+                match check(value, one, root, path) {
+                    Ok(()) => return Ok(()),
+                    Err(fault) => faults.push(fault),
+                }
+            }
+            return Err(faults.join("; or "));
+        }
+    }
+    let types: Vec<&str> = match &schema["type"] {
+        Value::Array(all) => all.iter().filter_map(Value::as_str).collect(),
+        one => one.as_str().into_iter().collect(),
+    };
+    let known = |kind: &&str| match *kind {
+        "null" => value.is_null(),
+        "boolean" => value.is_boolean(),
+        "integer" => value.is_i64() || value.is_u64(),
+        "number" => value.is_number(),
+        "string" => value.is_string(),
+        "array" => value.is_array(),
+        "object" => value.is_object(),
+        other => panic!("{path}: type {other}"),
+    };
+    if !types.is_empty() && !types.iter().any(known) {
+        return Err(format!("{path}: {value} is no {types:?}"));
+    }
+    let wrong = schema.get("const").is_some_and(|only| only != value)
+        || schema["enum"]
+            .as_array()
+            .is_some_and(|all| !all.contains(value));
+    if wrong {
+        return Err(format!("{path}: {value}"));
+    }
+    match value {
+        Value::Object(map) if schema["properties"].is_object() => {
+            for key in schema["required"].as_array().into_iter().flatten() {
+                let key = key.as_str().expect("a key");
+                if !map.contains_key(key) {
+                    return Err(format!("{path}/{key} is missing"));
+                }
+            }
+            for (key, value) in map {
+                let path = format!("{path}/{key}");
+                let Some(schema) = schema["properties"].get(key) else {
+                    return Err(format!("{path} is not described"));
+                };
+                check(value, schema, root, &path)?;
+            }
+        }
+        Value::Array(items) => {
+            for (index, item) in items.iter().enumerate() {
+                let own = schema["prefixItems"].get(index);
+                let schema = own.unwrap_or(&schema["items"]);
+                check(item, schema, root, &format!("{path}/{index}"))?;
+            }
+        }
+        _ => {}
+    }
+    Ok(())
 }
 
 #[test]
-fn every_key_of_an_evaluation_and_no_other() {
+fn a_report_is_as_described() {
+    let report = place_with_run().report("runs/scene");
+    conforms(&report, "report");
+    // And the check can fail.
+    let mut faulty = report.clone();
+    faulty["luma"]["held_out"]["other"] = json!(1);
+    assert!(fault(&faulty, "report").is_err(), "an unknown key");
+    faulty = report.clone();
+    faulty["capture"]
+        .as_object_mut()
+        .expect("keys")
+        .remove("views");
+    assert!(fault(&faulty, "report").is_err(), "a missing key");
+    faulty = report.clone();
+    faulty["chroma"]["views"][0]["colorfulness"] = json!("much");
+    assert!(fault(&faulty, "report").is_err(), "another type");
+    faulty = report;
+    faulty["preset"] = json!("quick");
+    assert!(fault(&faulty, "report").is_err(), "another value");
+}
+
+#[test]
+fn an_evaluation_is_as_described() {
     let teacher = onnx("ddcolor_tiny.onnx");
     let eval = ["eval", "--frames", "2", "--json"];
     let teacher = ["--teacher", &teacher, "--baselines"];
     let evaluation = place_with_run().json(&[&eval[..], &teacher].concat());
-    are_documented(&evaluation, "## eval.json");
-}
-
-/// Checks that the tables of a section of the page name the keys of a value and no other, but for
-/// those of items of an empty list.
-fn are_documented(value: &Value, section: &str) {
-    let keys = keys(value);
-    assert!(keys.len() > 50, "{keys:?}");
-    let mut documented = documented(&page(), section);
-    // No photo shows a frame of the path.
-    documented.retain(|key| !key.starts_with("path.pictures.delta_e."));
-    documented.retain(|key| {
-        let list = key.rsplit_once('.').map_or("", |(list, _)| list);
-        let list = value.pointer(&format!("/{}", list.replace('.', "/")));
-        list.and_then(Value::as_array)
-            .is_none_or(|list| !list.is_empty())
-    });
-    assert_eq!(documented, keys);
-}
-
-/// Paths of all keys of a value.
-pub fn keys(value: &Value) -> BTreeSet<String> {
-    let mut keys = BTreeSet::new();
-    collect_keys(value, "", &mut keys);
-    keys
-}
-
-/// Keys in the tables of a section of a page.
-pub fn documented(page: &str, section: &str) -> BTreeSet<String> {
-    // Rows of tables whose first cell is one or more paths.
-    let (_, section) = page.split_once(section).expect("the section");
-    let (section, _) = section.split_once("\n## ").unwrap_or((section, ""));
-    section
-        .lines()
-        .filter_map(|line| line.strip_prefix("| `")?.split('|').next())
-        .flat_map(|cell| cell.split('`').step_by(2))
-        .filter(|path| !path.trim().is_empty())
-        .map(str::to_owned)
-        .collect()
+    conforms(&evaluation, "eval");
 }
 
 #[test]
@@ -91,11 +142,19 @@ fn the_example_is_a_report() {
     let (_, example) = page.split_once("```json").expect("an example");
     let (example, _) = example.split_once("```").expect("its end");
     let example: Value = serde_json::from_str(example).expect("JSON");
-    let (mut real, mut shown) = (BTreeSet::new(), BTreeSet::new());
-    collect_keys(&report, "", &mut real);
-    collect_keys(&example, "", &mut shown);
-    assert!(shown.len() > 20 && shown.is_subset(&real), "{shown:?}");
+    assert!(holds(&report, &example), "{example}");
     assert_eq!(example["version"], report["version"]);
+}
+
+/// True if a value has all keys of another.
+fn holds(value: &Value, shown: &Value) -> bool {
+    match shown {
+        Value::Object(map) => map
+            .iter()
+            .all(|(key, shown)| value.get(key).is_some_and(|value| holds(value, shown))),
+        Value::Array(items) => items.iter().all(|shown| holds(&value[0], shown)),
+        _ => !value.is_object(),
+    }
 }
 
 #[test]
@@ -112,5 +171,49 @@ fn every_file_and_every_column() {
     let log = String::from_utf8(place.read("runs/scene/log.csv")).expect("text");
     for column in log.lines().next().expect("a header").split(',') {
         assert!(page.contains(&format!("`{column}`")), "{column}");
+    }
+}
+
+#[test]
+fn every_limit_names_tests_that_exist() {
+    let page = fs::read_to_string(format!("{DOCS}/limits.md")).expect("the page");
+    let mut tests = BTreeSet::new();
+    for folder in ["src", "tests"] {
+        list_tests(
+            &Path::new(env!("CARGO_MANIFEST_DIR")).join(folder),
+            &mut tests,
+        );
+    }
+    let mut count = 0;
+    for row in page.lines().filter(|line| line.starts_with("| ")) {
+        let last = row.trim_end_matches(['|', ' ']).rsplit('|').next();
+        let last = last.unwrap_or_default().trim();
+        if last == "Test" {
+            continue;
+        }
+        let names: Vec<&str> = last.split('`').skip(1).step_by(2).collect();
+        assert!(!names.is_empty(), "no test: {row}");
+        for name in names {
+            assert!(tests.contains(name), "{name}: {row}");
+            count += 1;
+        }
+    }
+    assert!(count > 40, "{count}");
+}
+
+/// Adds the names of the tests in a folder.
+fn list_tests(folder: &Path, tests: &mut BTreeSet<String>) {
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            list_tests(&path, tests);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let text = fs::read_to_string(&path).expect("a source");
+            let after = text.split("#[test]\n").skip(1);
+            tests.extend(after.filter_map(|test| {
+                let (name, _) = test.split_once("fn ")?.1.split_once('(')?;
+                Some(name.to_owned())
+            }));
+        }
     }
 }

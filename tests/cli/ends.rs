@@ -149,7 +149,7 @@ fn a_time_limit_ends_the_training() {
     let fit = ["fit", "scene", "--without", "background"];
     place.succeed(&[&fit[..], &["--time-limit", "0.2"]].concat());
     let luma = &place.report("runs/scene")["luma"];
-    // How well it is kept shows on real scenes (docs/lab/05-goals.md); that it is what
+    // How well it is kept shows on real scenes (docs/experiments.md); that it is what
     // ends the run, here: no preset has such a number of iterations.
     assert_eq!(luma["goal"], json!({ "kind": "within", "seconds": 12.0 }));
     assert!(![700, 3_500, 15_000].contains(&luma["iterations"].as_u64().expect("a number")));

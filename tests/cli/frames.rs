@@ -2,7 +2,7 @@
 
 use image::{DynamicImage, ImageBuffer, Luma};
 
-use super::documented::{documented, keys, page};
+use super::documented::conforms;
 use super::program::Place;
 use super::scene;
 use super::shared::{QUICK_FIT, onnx, place_with_run, place_with_scene};
@@ -30,7 +30,7 @@ fn photos_come_back_in_color_at_their_size_with_their_lightness() {
     place.succeed(&[&QUICK_FIT[..], &["--max-side", "32"]].concat());
     place.succeed(&["colorize", "--teacher", &onnx("ddcolor_tiny.onnx")]);
     let told = place.json(&["frames", "-o", "out/frames", "--json"]);
-    assert_eq!(documented(&page(), "## Photos in color"), keys(&told));
+    conforms(&told, "frames");
     let names: Vec<String> = (0..scene::VIEWS).map(scene::name).collect();
     assert_eq!(place.files("out/frames"), names);
     assert_eq!(
@@ -54,16 +54,7 @@ fn photos_come_back_in_color_at_their_size_with_their_lightness() {
     // Where they come from stands beside them.
     let changes = place.read("out/frames.changes.json");
     let changes: serde_json::Value = serde_json::from_slice(&changes).expect("JSON");
-    let (described, found) = (documented(&page(), "## Change report"), keys(&changes));
-    let below = |key: &&String| {
-        !["settings.", "scene_teachers."]
-            .iter()
-            .any(|k| key.starts_with(k))
-    };
-    assert_eq!(
-        described.iter().collect::<Vec<_>>(),
-        found.iter().filter(below).collect::<Vec<_>>()
-    );
+    conforms(&changes, "changes");
     assert_eq!(told["changes"], "out/frames.changes.json");
     let teacher = &changes["teachers"][0];
     assert_eq!(

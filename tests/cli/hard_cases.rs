@@ -1,103 +1,71 @@
-//! docs/hard-cases.md, which `doctor`'s test writes when it is asked to.
+//! docs/experiments/hard-cases.csv and kernels.csv, which `doctor`'s test writes when it is asked to.
 
-use std::fmt::Write;
+use std::fs;
 
 use gs_chroma::{
     gpu::Gpu,
     low_level::doctor::{Diagnosis, Verdict, measured::Row},
 };
 
-const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/hard-cases.md");
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/experiments");
+const COMMAND: &str = "WRITE_DOCS=1 cargo test --test cli doctor_says";
 
-const HEADER: &str = "# Hard cases
-
-Scenes at which splat rasterizers break (`src/doctor/cases.rs`), and how far this one is
-from the f64 oracle on them. *Picture error* is the largest of a pixel, in units of the
-brightest one, at least 1. *Gradient error* is the largest relative L2 error of a group of
-parameters against dual numbers. Where a † stands, one Gaussian is *poisoned*: it is culled
-and counted, and nothing else may change by it. `gs-chroma doctor` runs all this on your
-device. Bounds are the worst seen on the device below × 1.05, on others × 16; those of
-cases are at least 2e-6.
-
-f32 shows in 65,600 tiles, whose coordinates go beyond a million pixels in steps of 1/16,
-and in a needle across the pixels, where the exponent is a small difference of large terms
-([lab](lab/02-rasterizer.md)).
-
-`tests/device/stability` also poisons every parameter of Gaussians and every number of COLMAP
-models, breaks kernels on purpose, lints the shaders, and trains some hundred iterations
-each of worlds a thousandth and ten thousand times as large, turned, shifted; one photo;
-three points; flat, doubled and collapsed clouds; a camera inside a Gaussian; black, white
-and gray photos; 100,000 Gaussians in one tile; a strip as wide as 8K. A whole 8K photo
-trains one iteration, half a minute without a GPU. `tests/cli` and `src/color` test
-georeferenced coordinates, color conversions and files.
-
-`WRITE_DOCS=1 cargo test --test cli doctor_says` writes this page.
-";
-
-const KERNELS: &str = "## Kernels on random inputs
-
-The worst input of each row, where x is the oracle's value; bounds are rounded. Gradients are
-also bounded as a whole. A first cell without a name continues the kernel above.
-`gs-chroma doctor` also prints how many inputs there are, and how much of the bound was used.
-";
-
-/// The cases, with less than `doctor` prints of them.
-fn case_table(cases: &[Verdict]) -> String {
-    let mut text = String::from(
-        "| case | what goes wrong elsewhere | picture error (bound) | gradient error (bound) |\n\
-         |---|---|--:|--:|\n",
-    );
-    for case in cases {
-        let mark = if case.poisoned > 0 { " †" } else { "" };
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "| {} | {}{mark} | {:.1e} ({:.1e}) | {:.1e} ({:.1e}) |",
-            case.name,
-            case.trouble,
+/// The cases. Errors of a picture are in units of its brightest pixel, at least 1; those of
+/// gradients are the largest relative L2 of a group of parameters.
+fn cases(cases: &[Verdict]) -> String {
+    let head = "case,what goes wrong elsewhere,poisoned Gaussians,picture error,picture bound,gradient error,gradient bound";
+    let rows = cases.iter().map(|case| {
+        format!(
+            "{},{},{},{:.1e},{:.1e},{:.1e},{:.1e}",
+            quoted(case.name),
+            quoted(case.trouble),
+            case.poisoned,
             case.picture_error,
             case.picture_bound,
             case.gradient_error,
             case.gradient_bound,
-        );
-    }
-    text
+        )
+    });
+    table(head, rows)
 }
 
-/// The kernels, likewise.
-fn kernel_table(rows: &[Row]) -> String {
-    let mut text = String::from(
-        "| kernel | what | largest error | bound | relative L2 (bound) |\n\
-         |---|---|--:|---|--:|\n",
-    );
-    let mut above = "";
-    for row in rows {
-        let kernel = if row.kernel == above { "" } else { row.kernel };
-        above = row.kernel;
-        let bound = row.bound.replace("0.0e0 + ", "");
-        let whole = bound.strip_prefix("L2 ").and_then(|b| b.split_once("; "));
-        let (bound, l2) = match whole {
-            Some((l2, bound)) => (bound, format!("{:.2e} ({l2})", row.relative_l2)),
-            None => (bound.as_str(), String::new()),
-        };
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "| {kernel} | {} | {:.2e} | {bound} | {l2} |",
-            row.what, row.largest_error,
-        );
-    }
-    text
+/// The kernels on random inputs; x is the oracle's value.
+fn kernels(rows: &[Row]) -> String {
+    let head = "kernel,what,inputs,largest error,relative L2,bound";
+    let rows = rows.iter().map(|row| {
+        format!(
+            "{},{},{},{:.2e},{:.2e},{}",
+            quoted(row.kernel),
+            quoted(&row.what),
+            row.inputs,
+            row.largest_error,
+            row.relative_l2,
+            quoted(&row.bound),
+        )
+    });
+    table(head, rows)
 }
 
-/// Measures all cases and kernels and writes the page.
+fn table(head: &str, rows: impl Iterator<Item = String>) -> String {
+    let lines: Vec<String> = [head.to_owned()].into_iter().chain(rows).collect();
+    lines.join("\n") + "\n"
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
+/// Measures all cases and kernels and writes the files.
 pub fn write() {
     let gpu = Gpu::open().expect("a device");
     let diagnosis = Diagnosis::of(&gpu, &mut |_, _| {}).expect("a diagnosis");
     assert_eq!(diagnosis.failures(), 0);
     let device = format!("{} ({})", diagnosis.adapter, diagnosis.driver);
-    let cases = case_table(&diagnosis.cases);
-    let kernels = kernel_table(&diagnosis.kernels);
-    let page = format!("{HEADER}\nMeasured on {device}.\n\n{cases}\n{KERNELS}\n{kernels}");
-    std::fs::write(DOCS, page).expect("writable");
+    for (name, table) in [
+        ("hard-cases", cases(&diagnosis.cases)),
+        ("kernels", kernels(&diagnosis.kernels)),
+    ] {
+        let text = format!("# {COMMAND}; {device}\n{table}");
+        fs::write(format!("{FOLDER}/{name}.csv"), text).expect("writable");
+    }
 }

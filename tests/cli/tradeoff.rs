@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use super::documented::{documented, keys};
+use super::documented::conforms;
 use super::program::Place;
 use super::shared::{onnx, place_with_scene};
 
@@ -85,7 +85,7 @@ fn a_sweep_in_gray_and_color() {
     }
     what_is_on_the_way(&place, &sweep);
     what_the_files_hold(&place, &sweep);
-    what_is_documented(&sweep);
+    conforms(&sweep, "tradeoff");
 
     // All is done: the same again runs nothing, and prints the front.
     let done = place.read("out/tradeoff.json");
@@ -146,12 +146,6 @@ fn what_the_files_hold(place: &Place, sweep: &Value) {
         .filter(|point| !point["picture"].is_null());
     assert_eq!(html.matches("<img ").count(), pictures.count());
     assert!(html.len() < 100_000 && !html.contains("<script"));
-}
-
-fn what_is_documented(sweep: &Value) {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/tradeoff.md");
-    let page = fs::read_to_string(path).expect("the page");
-    assert_eq!(documented(&page, "## tradeoff.json"), keys(sweep));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::capture::{Camera, Photo, downscale};
 
 /// A picture smaller than its photo is sampled this finely along each axis, from a
 /// photo shrunk to that scale, and then averaged. Sampling a photo of the picture's
-/// own scale blurs it; docs/lab/01-photos.md has the figures.
+/// own scale blurs it; docs/experiments.md has the figures.
 const OVERSAMPLING: u32 = 2;
 
 /// Mapping from a photo to a view's image.

@@ -16,7 +16,7 @@ use crate::{
 const BAKE_VIEWS: usize = 16;
 
 /// Rounds of the bake, all at full size: pictures of half the size are blurred otherwise, and
-/// what is right for them is wrong for these. Twelve bring one percent (docs/lab/08-bake.md).
+/// what is right for them is wrong for these. Twelve bring one percent (docs/experiments.md).
 const BAKE_ROUNDS: usize = 8;
 
 /// Fits RGB harmonics, up to the degree of `settings`, to the colored pictures of `tasks`:

@@ -15,11 +15,11 @@ use crate::{
 const HALF_RANGE: [f64; 2] = [0.01, 0.25];
 
 /// Grays at which a Gaussian's own lightness decides what its a/b amount to; beyond,
-/// that of the nearer bound does (measured in docs/lab/08-bake.md).
+/// that of the nearer bound does.
 const LIKELY_GRAY: [f64; 2] = [0.2, 0.8];
 
 /// Chroma in CIELAB units up to which a Gaussian's own a/b decide what they do to RGB;
-/// stronger ones do as much more of the same (measured in docs/lab/08-bake.md).
+/// stronger ones do as much more of the same.
 const LIKELY_CHROMA: f64 = 25.0;
 
 /// RGB Gaussians that look like `luma` (one channel) with `chroma` (a, b).

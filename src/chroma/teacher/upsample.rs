@@ -20,7 +20,7 @@ pub enum Upsample {
 const SPATIAL_DEVIATION: f32 = 0.5;
 
 /// Standard deviation of the weight by difference of gray, in 8-bit levels.
-/// docs/lab/09-colors.md compares values on photos.
+/// docs/experiments.md compares values on photos.
 const GRAY_DEVIATION: f32 = 20.0;
 
 /// Reach of the weights in pixels of the answer: three deviations.

@@ -2,7 +2,7 @@
 //!
 //! Two figures: for the model alone, the reprojection error; for the photos, the correlation of the
 //! colors of COLMAP's points with the photo at their observations. Bounds and measurements are in
-//! docs/soundness.md.
+//! docs/limits.md.
 
 mod cause;
 mod colors;

@@ -5,7 +5,7 @@ use crate::{gpu::GpuError, luma::curve::gain_of_doubling};
 
 /// No curve is called flat before this share of the iterations, or [`GROWN`] if that is
 /// less: the set still grows, and what it learned is lost for a while each time
-/// (docs/lab/04-presets.md).
+/// (docs/experiments.md).
 const FLAT_FROM: f64 = 0.5;
 
 /// In so many iterations a set that begins to grow after 500 grows twelve times, by 30 % each.

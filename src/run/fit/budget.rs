@@ -35,7 +35,7 @@ pub(super) const WRITING: f64 = 0.01;
 const SURELY: f64 = 0.9;
 
 /// The least work that makes a scene. With fewer iterations there is none yet, so time
-/// is saved on Gaussians and pixels (docs/lab/05-goals.md).
+/// is saved on Gaussians and pixels.
 fn sketch() -> Workload {
     Workload {
         settings: LumaSettings {

@@ -4,7 +4,11 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::{out::timecode_of, shots::Shot};
+use super::{
+    change_report::{ChangeReport, ChangedFrame, ChangedOutput, ChangedSource},
+    out::timecode_of,
+    shots::Shot,
+};
 use crate::{
     archive::NumberedName,
     capture::Film,
@@ -130,54 +134,58 @@ impl Changes<'_> {
         };
         let name = name.unwrap_or_default().to_string_lossy();
         let beside = |kind: &str| place.with_file_name(format!("{name}.changes.{kind}"));
-        let report = self.report();
+        let report = serde_json::to_value(self.report())
+            .map_err(|error| StoreError::file(&beside("json"), error.to_string()))?;
         files::write(&beside("html"), self.page(&report).as_bytes())?;
         files::write(&beside("json"), format!("{report:#}\n").as_bytes())?;
         Ok(beside("json"))
     }
 
-    fn report(&self) -> Value {
+    fn report(&self) -> ChangeReport {
         let (output, film) = (self.output, self.film);
+        let text = |path: &Path| path.to_string_lossy().into_owned();
         let code = film.and_then(timecode_of);
         let chroma = self.report.chroma.as_ref();
-        let noted = chroma.and_then(|chroma| chroma.hint_folder.as_ref());
+        let noted = chroma.and_then(|chroma| chroma.hint_folder.clone());
         let frames = self.frames.iter().map(|frame| {
-            let mut told = json!({
-                "number": frame.index + 1,
-                "name": self.shots[frame.index].output,
-                "timecode": code.map(|code| code.after(frame.index as u64).to_string()),
-                "pose": frame.pose,
-            });
-            for (source, share) in SOURCES.iter().zip(frame.shares) {
-                told[source] = share.into();
+            let [scene, teacher, steadied, interpolated, spread, painted] = frame.shares;
+            ChangedFrame {
+                number: frame.index + 1,
+                name: self.shots[frame.index].output.clone(),
+                timecode: code.map(|code| code.after(frame.index as u64).to_string()),
+                pose: frame.pose,
+                scene,
+                teacher,
+                steadied,
+                interpolated,
+                spread,
+                painted,
             }
-            told
         });
-        let sha256 = is_film(output).then(|| hash_of_file(output));
-        json!({
-            "program": env!("CARGO_PKG_VERSION"),
-            "source": {
-                "path": film.map_or(self.root, |film| &film.source),
-                "sha256": film.and_then(hash_of_film),
-                "frame_rate": film.map(|film| film.frame_rate),
-                "start": film.map(|film| film.start),
-                "signal": film.and_then(|film| film.signal.as_ref()),
+        ChangeReport {
+            program: env!("CARGO_PKG_VERSION"),
+            source: ChangedSource {
+                path: text(film.map_or(self.root, |film| &film.source)),
+                sha256: film.and_then(hash_of_film),
+                frame_rate: film.map(|film| film.frame_rate),
+                start: film.map(|film| film.start),
+                signal: film.and_then(|film| film.signal.clone()),
             },
-            "output": {
-                "path": output,
-                "sha256": sha256,
-                "codec": self.codec,
-                "frame_rate": self.rate,
-                "timecode": code.map(|code| code.at_rate(self.rate).to_string()),
-                "field_order": "progressive",
+            output: ChangedOutput {
+                path: text(output),
+                sha256: is_film(output).then(|| hash_of_file(output)).flatten(),
+                codec: self.codec,
+                frame_rate: self.rate,
+                timecode: code.map(|code| code.at_rate(self.rate).to_string()),
+                field_order: "progressive",
             },
-            "teachers": self.teachers,
-            "scene": self.report.files,
-            "scene_teachers": chroma.map(|chroma| &chroma.teachers),
-            "hints": self.hints.map(|path| json!(path)).or(noted.map(|path| json!(path))),
-            "settings": self.settings,
-            "frames": frames.collect::<Vec<_>>(),
-        })
+            frames: frames.collect(),
+            scene: self.report.files.clone(),
+            scene_teachers: chroma.map(|chroma| chroma.teachers.clone()),
+            hints: self.hints.map(text).or(noted),
+            teachers: self.teachers.clone(),
+            settings: self.settings.clone(),
+        }
     }
 
     /// A page of two tables: ranges of frames, and sources.

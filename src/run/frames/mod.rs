@@ -1,5 +1,6 @@
 //! `frames`: the photos themselves in color.
 
+mod change_report;
 mod changes;
 mod estimated;
 mod out;
@@ -14,6 +15,8 @@ pub(crate) use without_scene::{PlainFramesOptions, frames_without_scene};
 
 use std::{cell::RefCell, path::PathBuf};
 
+#[cfg(test)]
+pub(crate) use change_report::ChangeReport;
 use changes::{Changes, FrameSources};
 use estimated::estimate;
 use out::FrameOutput;

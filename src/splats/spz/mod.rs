@@ -27,7 +27,7 @@
 //! | harmonics | 9, 24, 45 | 128 + 128 value, channels next to each other |
 //!
 //! The reference writer rounds harmonics to 5 bits of degree 1 and 4 of the others, which
-//! compresses better and can be seen; this one keeps all 8, see docs/lab/15-viewers-and-files.md.
+//! compresses better and can be seen; this one keeps all 8, see docs/experiments.md.
 //!
 //! **Axes.** The reference says right, up, back, and converts only where it is told from what.
 //! splat-transform, SuperSplat, PlayCanvas and Spark take the numbers as those of a `.ply`; this

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::real::GARDEN;
 use super::restored::streams;
+use crate::documented::conforms;
 use crate::program::Place;
 
 /// 12 frames of a camera that stands, 5 black ones, and 6 without anything that matches; a tone.
@@ -57,6 +58,7 @@ fn a_film_of_several_shots_comes_back_whole() {
         "--json",
     ];
     let told = place.json(&auto);
+    conforms(&told, "reel");
     let shots = told["shots"].as_array().expect("shots");
     assert_eq!(shots.len(), 3, "{told:#}");
     assert_eq!(shots[0]["camera"], "stands", "{told:#}");

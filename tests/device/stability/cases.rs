@@ -1,4 +1,4 @@
-//! The table of cases: each has a name of its own, stands in docs/hard-cases.md, and shows what it
+//! The table of cases: each has a name of its own, stands in docs/experiments/hard-cases.csv, and shows what it
 //! is about. That all hold is what `doctor` finds, which tests/cli runs.
 
 use std::collections::BTreeSet;
@@ -8,7 +8,10 @@ use gs_chroma::low_level::{
     oracle::{render::visible, shade::Shading},
 };
 
-const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/hard-cases.md");
+const DOCS: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/docs/experiments/hard-cases.csv"
+);
 
 #[test]
 fn cases_have_names_of_their_own_and_stand_in_the_documentation() {
@@ -17,7 +20,7 @@ fn cases_have_names_of_their_own_and_stand_in_the_documentation() {
     let docs = std::fs::read_to_string(DOCS).unwrap();
     for name in names {
         assert!(
-            docs.contains(&format!("| {name} |")),
+            docs.contains(&format!("\n\"{name}\",")),
             "{name} is missing: see {DOCS}"
         );
     }
