@@ -26,7 +26,10 @@ impl LayerKernels {
             (_, ColorKind::Luma) => [shaders::BLEND_LUMA, shaders::BLEND_LUMA_SIMD],
             (_, ColorKind::Chroma) => [shaders::BLEND_CHROMA, shaders::BLEND_CHROMA_SIMD],
             (Falloff::Gaussian, ColorKind::Rgb) => [shaders::BLEND_RGB, shaders::BLEND_RGB_SIMD],
-            (Falloff::PlayCanvas, ColorKind::Rgb) => [shaders::BLEND_RGB_PLAYCANVAS; 2],
+            (Falloff::PlayCanvas, ColorKind::Rgb) => [
+                shaders::BLEND_RGB_PLAYCANVAS,
+                shaders::BLEND_RGB_PLAYCANVAS_SIMD,
+            ],
         };
         Self {
             shade: Kernel::new(gpu, "shade", shade),

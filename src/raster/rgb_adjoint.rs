@@ -41,7 +41,13 @@ impl RgbAdjointKernels {
                 shaders::PROJECT_BACKWARD_RGB_STEP,
             ],
             Falloff::PlayCanvas => [
-                shaders::BLEND_BACKWARD_RGB_PLAYCANVAS,
+                variant(
+                    gpu,
+                    [
+                        shaders::BLEND_BACKWARD_RGB_PLAYCANVAS,
+                        shaders::BLEND_BACKWARD_RGB_PLAYCANVAS_SIMD,
+                    ],
+                ),
                 shaders::SUM_INSTANCES_RGB_PLAYCANVAS,
                 shaders::SHADE_BACKWARD_RGB_STEP_PLAYCANVAS,
                 shaders::PROJECT_BACKWARD_RGB_STEP_PLAYCANVAS,

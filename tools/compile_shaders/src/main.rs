@@ -132,12 +132,18 @@ fn compiled() -> BTreeMap<String, String> {
         compile("blend", &format!("_{color}_simd"), &[color, "simd"]);
     }
     compile("blend", "_depth_simd", &["luma", "depth", "simd"]);
+    compile(
+        "blend",
+        "_rgb_playcanvas_simd",
+        &["rgb", "playcanvas", "simd"],
+    );
     let simd = |features: &[&'static str]| [features, &["simd"]].concat();
     for (suffix, features) in [
         ("_luma", &["luma", "geometry"][..]),
         ("_luma_half", &["luma", "geometry", "half"]),
         ("_figures", &["figures"]),
         ("_rgb", &trained),
+        ("_rgb_playcanvas", &["rgb", "geometry", "playcanvas"]),
     ] {
         compile("blend_backward", &format!("{suffix}_simd"), &simd(features));
     }
