@@ -10,7 +10,7 @@ use std::{
 use super::program::Place;
 
 /// All commands.
-pub const COMMANDS: [&str; 18] = [
+pub const COMMANDS: [&str; 19] = [
     "auto",
     "prepare",
     "plan",
@@ -19,6 +19,7 @@ pub const COMMANDS: [&str; 18] = [
     "merge",
     "colorize",
     "teacher",
+    "studio",
     "view",
     "render",
     "frames",

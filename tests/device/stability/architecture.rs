@@ -6,7 +6,7 @@ use std::{collections::BTreeSet, fs, path::Path};
 /// does not know each other.
 const FLOORS: [&[&str]; 15] = [
     &["cli"],
-    &["auto", "paint"],
+    &["auto", "paint", "studio"],
     &["tradeoff", "view"],
     &["run", "prepare"],
     &["subject"],
