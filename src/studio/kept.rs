@@ -2,11 +2,14 @@
 
 use std::path::Path;
 
-use super::StudioError;
+use super::error::StudioError;
 use crate::{input, store::files};
 
 /// File in the folder of a job's results with the words of its command.
 const COMMAND: &str = "studio.json";
+
+/// Place of the folder among the words: `auto INPUT --teacher TEACHER -o FOLDER`.
+const OUTPUT: usize = 5;
 
 /// A word that is no option.
 pub fn word(text: &str) -> Result<String, StudioError> {
@@ -21,19 +24,22 @@ pub fn word(text: &str) -> Result<String, StudioError> {
 pub fn more(text: &str) -> Result<Vec<String>, StudioError> {
     let refused = || StudioError::Refused(text.to_owned());
     let words: Vec<String> = shlex::split(text).ok_or_else(refused)?;
-    match words.iter().any(elsewhere) {
+    match words.iter().any(|word| elsewhere(word)) {
         true => Err(refused()),
         false => Ok(words),
     }
 }
 
 /// Returns true of an option that names the folder of the results, or may.
-fn elsewhere(word: &String) -> bool {
+fn elsewhere(word: &str) -> bool {
     word.starts_with("--o") || (word.starts_with('-') && !word.starts_with("--"))
 }
 
-/// Keeps the words of a command that makes a folder.
-pub fn keep(output: &Path, words: &[String]) -> Result<(), StudioError> {
+/// Keeps the words of a command that makes a folder in that folder.
+pub fn keep(words: &[String]) -> Result<(), StudioError> {
+    let Some(output) = words.get(OUTPUT).map(Path::new) else {
+        return Err(StudioError::Gone);
+    };
     files::make_folder(output)?;
     let text = serde_json::to_string(words).unwrap_or_default();
     Ok(files::write(&output.join(COMMAND), text.as_bytes())?)
@@ -49,6 +55,7 @@ pub fn kept(output: &Path) -> Option<Vec<String>> {
     };
     let own =
         auto == "auto" && teaches == "--teacher" && leads == "-o" && Path::new(place) == output;
-    let sound = !from.starts_with('-') && word(teacher).is_ok() && !more.iter().any(elsewhere);
+    let sound =
+        !from.starts_with('-') && word(teacher).is_ok() && !more.iter().any(|word| elsewhere(word));
     (own && sound).then_some(words)
 }

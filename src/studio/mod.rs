@@ -5,6 +5,7 @@
 //! are those in a folder. A request never names a file of it; runs go by the digest of their path.
 
 mod content;
+mod error;
 mod job;
 mod kept;
 mod request;
@@ -17,38 +18,16 @@ use std::{
 };
 
 pub use content::StudioContent;
+pub use error::StudioError;
 use job::Job;
+use kept::keep;
 use request::StudioRequest;
 use serde_json::{Value, json};
 
-use crate::{store::StoreError, tradeoff::shell_line};
+use crate::tradeoff::shell_line;
 
 /// Jobs that go on at a time, at most.
 const GOING: usize = 8;
-
-/// Error of the studio.
-#[derive(Debug, thiserror::Error)]
-pub enum StudioError {
-    /// The folder, or a file in it.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// There is no film and no folder of photos.
-    #[error("{}: is not there", .0.display())]
-    NoInput(PathBuf),
-    /// A name that is no file name, a word that would be an option, or options that choose the
-    /// folder of the results.
-    #[error("{0:?} is refused here")]
-    Refused(String),
-    /// Another run has this name.
-    #[error("{}: is there already", .0.display())]
-    Taken(PathBuf),
-    /// The page is of another time.
-    #[error("it is gone")]
-    Gone,
-    /// Training and coloring share a device.
-    #[error("another job goes on: wait for it, or stop it")]
-    Busy,
-}
 
 /// A folder of runs, and the commands that were started from its page.
 pub struct Studio {
@@ -121,6 +100,9 @@ impl Studio {
         }
         if going().count() >= GOING || (makes && going().any(|job| job.makes)) {
             return Err(StudioError::Busy);
+        }
+        if makes {
+            keep(&words)?;
         }
         let number = state.jobs.last().map_or(1, |job| job.number + 1);
         let job = Arc::new(Job::new(number, words, makes));

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::{
-    StudioError,
-    kept::{keep, kept, more, word},
+    error::StudioError,
+    kept::{kept, more, word},
     shelf,
 };
 use crate::run::Preset;
@@ -94,7 +94,6 @@ impl StudioRequest {
                     words.extend(["--preset".to_owned(), preset.to_string()]);
                 }
                 words.extend(more(&options)?);
-                keep(&output, &words)?;
                 (words, true)
             }
             Self::Fetch { teacher } => {

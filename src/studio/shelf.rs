@@ -9,7 +9,7 @@ use std::{
 use image::ImageFormat;
 use serde_json::{Value, json};
 
-use super::{StudioError, kept::kept};
+use super::{error::StudioError, kept::kept};
 use crate::{
     capture::decode_image,
     hash::Hasher,
