@@ -3,7 +3,7 @@
 //! Imports go down only:
 //!
 //! ```text
-//! cli → auto, paint → tradeoff, view → run, prepare → subject → store → tell → eval, frames, viewers, blocks → report, doctor → luma, chroma → effects, measure, trajectory → raster
+//! cli → auto, paint, studio → tradeoff, view → run, prepare → subject → store → tell → eval, frames, viewers, blocks → report, doctor → luma, chroma → effects, measure, trajectory → raster
 //! → capture, splats → gpu, color, sections, download, npy, programs, archive, oracle, compare → disk, hash, input, invocation
 //! ```
 //!
@@ -97,6 +97,8 @@ mod sections;
 pub mod splats;
 #[cfg(feature = "cli")]
 mod store;
+#[cfg(feature = "cli")]
+mod studio;
 #[cfg(feature = "cli")]
 mod subject;
 #[cfg(feature = "cli")]

@@ -344,7 +344,19 @@ async function begin() {
   reset();
   at("poster").hidden = true;
   if (about.live) follow();
-  if (about.paint) await (await import("./paint.js")).paint({ about, jump, recolor, dragWipe });
+  if (about.paint) await (await import("./paint/paint.js")).paint({ about, jump, recolor, dragWipe, camera: viewOfPage, fitted });
+}
+
+/** The view of the page, in its own pixels. */
+function viewOfPage() {
+  const { width, height, fx, fy, cx, cy, rotation, translation } = camera.view(stage.clientWidth, stage.clientHeight, near());
+  return { width, height, fx, fy, cx, cy, rotation, translation };
+}
+
+/** Where the camera's own picture lies on the page, in its pixels. */
+function fitted() {
+  const { scale, left, top } = camera.fitted(stage.clientWidth, stage.clientHeight);
+  return { x: left, y: top, width: scale * camera.lens.width, height: scale * camera.lens.height };
 }
 
 /** Shows the scene in other colors: halves as its own. */

@@ -17,7 +17,7 @@ use super::{
 use crate::{
     capture::{Camera, Dataset, Photo, downscale},
     color::gray_to_lightness,
-    raster::{ColorKind, Raster},
+    raster::{ColorKind, Raster, RenderedImage},
     splats::{ShField, Splats, sh},
 };
 
@@ -386,12 +386,13 @@ impl<'a> Repainter<'a> {
             .collect())
     }
 
-    /// A map of doubt, as a and b that tint the Gaussians by it, and so many views to paint next:
-    /// each shows most of what those before do not.
+    /// A map of doubt, as a and b that tint the Gaussians by it, and so many places to paint next:
+    /// each in the view that shows most of what those before do not, where it shows most, in shares
+    /// of its sides.
     ///
     /// # Errors
     /// [`ChromaError`] of the device or of the file that targets wait in.
-    pub fn doubt(&self, views: usize) -> Result<(ShField, Vec<usize>), ChromaError> {
+    pub fn doubt(&self, places: usize) -> Result<(ShField, Vec<DoubtfulPlace>), ChromaError> {
         let mut doubts = self.doubts()?;
         let one = 1.0 / sh::C0 as f32;
         let mut tint = ShField::zeros(doubts.len(), 0, 2);
@@ -399,7 +400,7 @@ impl<'a> Repainter<'a> {
             ab.copy_from_slice(&TINT.map(|value| one * doubt * value));
         }
         let mut found = Vec::new();
-        for _ in 0..views.min(self.frozen.len()) {
+        for _ in 0..places.min(self.frozen.len()) {
             let mut field = ShField::zeros(doubts.len(), 0, 2);
             for (ab, doubt) in field.coefficients.chunks_exact_mut(2).zip(&doubts) {
                 ab[0] = one * doubt;
@@ -410,13 +411,13 @@ impl<'a> Repainter<'a> {
                 let drawn = self.frozen.draw(view, &[&field])?;
                 let doubt: f32 = drawn[0].pixels.iter().sum();
                 if doubt > most.0 {
-                    most = (doubt, Some(view));
+                    most = (doubt, Some((view, heaviest(&drawn[0]))));
                 }
             }
-            let Some(best) = most.1 else {
+            let Some((best, place)) = most.1 else {
                 break;
             };
-            found.push(best);
+            found.push((best, place));
             let pixels = self.frozen.uniform(best, 0).pixel_count();
             let shown = self
                 .frozen
@@ -427,4 +428,23 @@ impl<'a> Repainter<'a> {
         }
         Ok((tint, found))
     }
+}
+
+/// A view, and a place in it in shares of its sides.
+pub type DoubtfulPlace = (usize, [f32; 2]);
+
+/// Cells to each side of a picture among which the heaviest is found.
+const CELLS: usize = 12;
+
+/// Center of the cell of a picture whose first channel sums to most.
+fn heaviest(picture: &RenderedImage) -> [f32; 2] {
+    let [width, height] = [picture.width, picture.height].map(|side| side as usize);
+    let mut sums = [0.0_f32; CELLS * CELLS];
+    for (i, pixel) in picture.pixels.chunks_exact(picture.channels).enumerate() {
+        let cell = [i % width * CELLS / width, i / width * CELLS / height];
+        sums[cell[1] * CELLS + cell[0]] += pixel[0];
+    }
+    let best = (0..sums.len()).max_by(|&a, &b| sums[a].total_cmp(&sums[b]));
+    let best = best.unwrap_or_default();
+    [best % CELLS, best / CELLS].map(|cell| (cell as f32 + 0.5) / CELLS as f32)
 }

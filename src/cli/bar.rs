@@ -1,7 +1,7 @@
 //! A progress bar: what it says, and how it gets to standard error.
 
 use std::{
-    fmt,
+    env, fmt,
     io::{self, Write},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
@@ -15,6 +15,7 @@ use console::truncate_str;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 use super::printable;
+use crate::programs::TETHER;
 
 /// Columns of a line at most: a terminal as it opens.
 pub(super) const WIDTH: usize = 80;
@@ -29,8 +30,9 @@ const MEMORY: f64 = 15.0;
 /// Redraw interval where no progress is reported.
 const TICK: Duration = Duration::from_millis(250);
 
-/// Interval of lines where standard error is no terminal.
+/// Interval of lines where standard error is no terminal, and where a page shows them.
 const LINE: Duration = Duration::from_secs(60);
+const LINE_OF_PAGE: Duration = Duration::from_secs(1);
 
 /// Progress line on standard error; where that is no terminal, a line a minute.
 pub(super) struct Bar {
@@ -58,7 +60,11 @@ impl Bar {
             // Nobody may listen any more.
             let _ = writeln!(io::stderr(), "{line}");
         };
-        let lines = (shown.is_hidden()).then(|| in_lines(state.clone(), LINE, say));
+        let interval = match env::var_os(TETHER) {
+            Some(_) => LINE_OF_PAGE,
+            None => LINE,
+        };
+        let lines = (shown.is_hidden()).then(|| in_lines(state.clone(), interval, say));
         Self {
             shown,
             state,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::remedy;
 use crate::{
     auto::AutoError, download::DownloadError, prepare::PrepareError, run::RunError,
-    store::StoreError, tradeoff::TradeoffError, view::ViewerError,
+    store::StoreError, studio::StudioError, tradeoff::TradeoffError, view::ViewerError,
 };
 
 /// Error of a command; one line that names the file and the remedy.
@@ -23,6 +23,9 @@ pub enum CliError {
     /// A scene cannot be shown.
     #[error("{}", remedy::of_viewer(.0))]
     Viewer(#[from] ViewerError),
+    /// The studio's folder.
+    #[error(transparent)]
+    Studio(#[from] StudioError),
     /// A film or photos could not be prepared.
     #[error("{}", remedy::of_preparing(.0))]
     Prepare(#[from] PrepareError),

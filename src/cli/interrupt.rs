@@ -1,11 +1,13 @@
 //! SIGINT and SIGTERM.
 
 use std::{
+    env, io,
     process::exit,
     sync::{
         Arc, OnceLock,
         atomic::{AtomicBool, Ordering},
     },
+    thread,
 };
 
 use super::CliError;
@@ -14,11 +16,25 @@ use crate::{disk, programs, run::RunError, store::Interrupt};
 /// A shell reports a program that signal N ended by this and N.
 const BASE_STATUS: i32 = 128;
 
+/// The signal of Ctrl-C.
+const INTERRUPTED: i32 = 2;
+
 /// Interrupt flag that a signal raises, where it does not end the program.
 static HEEDED: OnceLock<Arc<Interrupt>> = OnceLock::new();
 
 /// True if a signal is the normal end of the command.
 static ENDS_WELL: AtomicBool = AtomicBool::new(false);
+
+/// Heeds the end of standard input as a signal, where whoever started the program wants that.
+fn heed_tether() {
+    // What it starts itself it ends itself.
+    if env::var_os(programs::TETHER).is_some() {
+        thread::spawn(|| {
+            let _ = io::copy(&mut io::stdin(), &mut io::sink());
+            heed(INTERRUPTED);
+        });
+    }
+}
 
 /// Lets signals end the program without leaving files behind that were only begun.
 #[cfg(unix)]
@@ -29,14 +45,15 @@ pub(super) fn heed_signals() -> Result<(), CliError> {
     flag::register(consts::SIGXFSZ, Arc::default()).map_err(failed)?;
     let mut signals =
         Signals::new([consts::SIGINT, consts::SIGTERM, consts::SIGHUP]).map_err(failed)?;
-    std::thread::spawn(move || signals.forever().for_each(heed));
+    thread::spawn(move || signals.forever().for_each(heed));
+    heed_tether();
     Ok(())
 }
 
 /// Lets Ctrl-C end the program without leaving files behind that were only begun.
 #[cfg(not(unix))]
 pub(super) fn heed_signals() -> Result<(), CliError> {
-    const INTERRUPTED: i32 = 2;
+    heed_tether();
     ctrlc::set_handler(|| heed(INTERRUPTED))
         .map_err(|error| RunError::Signals(error.to_string()).into())
 }

@@ -31,6 +31,7 @@ mod progress;
 mod remedy;
 mod render;
 mod shell;
+mod studio;
 mod teacher;
 mod tradeoff;
 mod usage;
@@ -74,6 +75,7 @@ enum Command {
     #[command(aliases = ["colorise", "colourize", "colourise"])]
     Colorize(colorize::Colorize),
     Teacher(teacher::TeacherCommand),
+    Studio(studio::StudioCommand),
     View(view::View),
     Render(render::Render),
     Frames(frames::FramesCommand),
@@ -116,6 +118,7 @@ impl Cli {
             Command::Merge(command) => command.run(),
             Command::Colorize(command) => command.run(),
             Command::Teacher(command) => command.run(),
+            Command::Studio(command) => command.run(),
             Command::View(command) => command.run(),
             Command::Render(command) => command.run(),
             Command::Frames(command) => command.run(),

@@ -48,16 +48,18 @@ impl View {
     pub(super) fn run(self) -> Result<(), CliError> {
         let mut progress = Progress::through(vec![Stage::Model]);
         let (run, colmap) = (self.run.as_deref(), self.colmap.as_deref());
-        let viewed = ViewedScene::open(run, colmap, &mut |event| progress.show(&event))?;
-        let name = viewed.name.clone();
-        let content = RunContent::new(viewed, &mut |event| progress.show(&event))?;
+        let observe = &mut |event| progress.show(&event);
         if self.paint {
-            let session = PaintSession::open(run, colmap, &mut |event| progress.show(&event))?;
-            let content = PaintContent::new(content, session);
+            let session = PaintSession::open(run, colmap, observe)?;
+            let name = session.scene.viewed.name.clone();
+            let content = PaintContent::new(session);
             let server = Server::bind(self.port)?.taking();
             progress.finish();
             return self.serve(&server, &name, move |request| content.answer(request));
         }
+        let viewed = ViewedScene::open(run, colmap, observe)?;
+        let name = viewed.name.clone();
+        let content = RunContent::new(viewed, observe)?;
         let server = Server::bind(self.port)?;
         progress.finish();
         self.serve(&server, &name, move |request| answer(&content, request))

@@ -21,5 +21,5 @@ pub use blend::{WeightedColors, blend};
 pub use canvas::Canvas;
 pub use finish::{Colored, finish};
 pub use painted::Strokes;
-pub use scene::{SceneDrawer, ViewOf, believable};
+pub use scene::{SceneDrawer, ViewOf, believable, places};
 pub use steady::{Steadied, steady};

@@ -135,6 +135,9 @@ impl<'a> SceneDrawer<'a> {
     /// Position of each pixel of the canvas in a view's picture.
     fn places(&mut self, seen: &ViewOf<'_>, canvas: &Canvas) -> Arc<Vec<[f32; 2]>> {
         let size = [canvas.width, canvas.height];
+        let Some(undistortion) = &seen.view.undistortion else {
+            return Arc::new(places(seen, size));
+        };
         let Camera {
             width,
             height,
@@ -144,19 +147,6 @@ impl<'a> SceneDrawer<'a> {
             cy,
             ..
         } = *seen.camera;
-        let Some(undistortion) = &seen.view.undistortion else {
-            let scale = [
-                width as f32 / canvas.width as f32,
-                height as f32 / canvas.height as f32,
-            ];
-            let place = |i: u32| {
-                [
-                    ((i % size[0]) as f32 + 0.5) * scale[0],
-                    ((i / size[0]) as f32 + 0.5) * scale[1],
-                ]
-            };
-            return Arc::new((0..size[0] * size[1]).map(place).collect());
-        };
         let camera = [f64::from(width), f64::from(height), fx, fy, cx, cy];
         let known = self.lenses.iter().find(|lens| {
             lens.size == size && lens.camera == camera && lens.undistortion == *undistortion
@@ -164,7 +154,7 @@ impl<'a> SceneDrawer<'a> {
         if let Some(lens) = known {
             return lens.places.clone();
         }
-        let places = Arc::new(undistortion.places(size, seen.camera));
+        let places = Arc::new(places(seen, size));
         if self.lenses.len() >= LENSES {
             self.lenses.remove(0);
         }
@@ -176,6 +166,25 @@ impl<'a> SceneDrawer<'a> {
         });
         places
     }
+}
+
+/// Position of each pixel of a photo of a size in a view's picture, in pixels of it.
+pub fn places(seen: &ViewOf<'_>, size: [u32; 2]) -> Vec<[f32; 2]> {
+    if let Some(undistortion) = &seen.view.undistortion {
+        return undistortion.places(size, seen.camera);
+    }
+    let [width, height] = size;
+    let scale = [
+        seen.camera.width as f32 / width as f32,
+        seen.camera.height as f32 / height as f32,
+    ];
+    let place = |i: u32| {
+        [
+            ((i % width) as f32 + 0.5) * scale[0],
+            ((i / width) as f32 + 0.5) * scale[1],
+        ]
+    };
+    (0..width * height).map(place).collect()
 }
 
 /// Lenses that are kept: those of a rig, or the faces of one photo.

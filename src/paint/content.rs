@@ -6,15 +6,21 @@ use image::{ExtendedColorType, GrayImage, RgbImage, imageops};
 use serde_json::{Value, json};
 
 use super::{
-    layer::{Stroke, encoded},
+    command::Choices,
+    free_view::ViewStroke,
+    layer::encoded,
     log::Act,
     pictures::Colors,
-    session::PaintSession,
+    session::{PaintSession, Stroke},
 };
 use crate::{
     run::RunError,
     subject::SceneKind,
-    view::{Content, Request, Response, RunContent, answer, assets::PAINT, pack},
+    view::{
+        Content, Request, Response, RunContent, answer,
+        assets::{PAINT, PAINT_NAMES},
+        pack,
+    },
 };
 
 /// How long a page waits for news.
@@ -30,22 +36,20 @@ pub struct PaintContent {
 }
 
 impl PaintContent {
-    /// The page of a run and of whoever paints on it.
-    pub fn new(run: RunContent, session: Arc<PaintSession>) -> Self {
+    /// The page of a session.
+    pub fn new(session: Arc<PaintSession>) -> Self {
+        let run = RunContent::unread(session.scene.viewed.clone());
         Self { run, session }
     }
 
     /// The answer to a request.
     pub fn answer(&self, request: &Request) -> Response {
-        let text = |kind, body: &str| Response::ok(kind, body.as_bytes());
-        match request.path.as_str() {
-            "/paint.js" => return text("text/javascript; charset=utf-8", PAINT[0]),
-            "/paint.css" => return text("text/css; charset=utf-8", PAINT[1]),
-            _ => {}
-        }
         let Some(place) = request.path.strip_prefix("/paint/") else {
             return answer(self, request);
         };
+        if let Some(file) = PAINT_NAMES.iter().position(|name| *name == place) {
+            return Response::asset(place, PAINT[file]);
+        }
         let found = match &request.posted {
             Some(body) => self.take(place, body),
             None => self.show(place),
@@ -58,12 +62,31 @@ impl PaintContent {
     /// Does what a page asks to be done.
     fn take(&self, place: &str, body: &[u8]) -> Result<Response, RunError> {
         let session = &self.session;
+        let refused = || {
+            Ok(Response::refused(
+                "400 Bad Request",
+                "this cannot be drawn or chosen",
+            ))
+        };
+        let photos = session.scene.photos.len();
         match place {
             "stroke" => match serde_json::from_slice::<Stroke>(body) {
-                Ok(stroke) if stroke.is_sound() && stroke.photo < session.scene.photos.len() => {
+                Ok(stroke) if stroke.points.is_sound() && stroke.photo < photos => {
                     session.draw(&stroke)?;
                 }
-                _ => return Ok(Response::refused("400 Bad Request", "this is no stroke")),
+                _ => return refused(),
+            },
+            "view-stroke" => match serde_json::from_slice::<ViewStroke>(body) {
+                Ok(stroke) if stroke.is_sound() => {
+                    let photos = session.draw_in_view(&stroke)?;
+                    let body = json!({ "photos": photos }).to_string();
+                    return Ok(Response::ok("application/json", body));
+                }
+                _ => return refused(),
+            },
+            "choices" => match serde_json::from_slice::<Choices>(body) {
+                Ok(choices) if choices.are_sound() => session.choose(choices),
+                _ => return refused(),
             },
             "undo" => session.turn(Act::Undo)?,
             "redo" => session.turn(Act::Redo)?,

@@ -15,24 +15,67 @@ use crate::capture::{Orientation, decode_image};
 const POINTS: usize = 20_000;
 const RADIUS: f32 = 1000.0;
 
-/// A stroke of a round brush, in pixels of the upright layer.
-#[derive(Clone, Debug, Deserialize, PartialEq)]
-pub struct Stroke {
-    /// Index of the photo.
-    pub photo: usize,
-    /// sRGB; none takes paint away.
-    pub color: Option<[u8; 3]>,
-    /// Center and radius of the brush along its way: x, y, r.
-    pub points: Vec<[f32; 3]>,
+/// What a brush leaves.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Paint {
+    /// sRGB.
+    Color([u8; 3]),
+    /// What the teachers want there: no other stroke colors it.
+    Teacher,
+    /// Takes paint away.
+    Nothing,
 }
 
-impl Stroke {
+/// Way of a round brush: its center and radius in pixels, x, y, r.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+pub struct Way(pub Vec<[f32; 3]>);
+
+/// The share of the pixels of a region that paint covers, 0 to 1, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mask {
+    pub region: Region,
+    pub shares: Vec<f32>,
+}
+
+impl Mask {
+    /// The share of a pixel of the picture, 0 outside.
+    pub fn at(&self, x: u32, y: u32) -> f32 {
+        let [left, top, width, height] = self.region;
+        let [x, y] = [x.wrapping_sub(left), y.wrapping_sub(top)];
+        match x < width && y < height {
+            true => self.shares[(y * width + x) as usize],
+            false => 0.0,
+        }
+    }
+}
+
+impl Way {
     /// Returns true if a brush can be moved so.
     pub fn is_sound(&self) -> bool {
         let sound = |&[x, y, r]: &[f32; 3]| {
             [x, y].iter().all(|v| v.abs() < 1e5) && (0.1..=RADIUS).contains(&r)
         };
-        (1..=POINTS).contains(&self.points.len()) && self.points.iter().all(sound)
+        (1..=POINTS).contains(&self.0.len()) && self.0.iter().all(sound)
+    }
+
+    /// The pixels of a picture that the brush covers; none where it passes outside.
+    pub fn mask(&self, size: [u32; 2]) -> Option<Mask> {
+        let region = reach(&self.0, size)?;
+        let [left, top, width, height] = region;
+        let mut shares = vec![0.0_f32; width as usize * height as usize];
+        for k in 0..self.0.len() {
+            let piece = [k.saturating_sub(1), k].map(|k| self.0[k]);
+            let Some([x0, y0, w, h]) = reach(&piece, size) else {
+                continue;
+            };
+            for (y, x) in (y0..y0 + h).flat_map(|y| (x0..x0 + w).map(move |x| (y, x))) {
+                let share = Self::share(piece, [x as f32 + 0.5, y as f32 + 0.5]);
+                let own = &mut shares[((y - top) * width + x - left) as usize];
+                *own = own.max(share);
+            }
+        }
+        Some(Mask { region, shares })
     }
 
     /// The brush's share of a pixel, 0 to 1, along one piece of the way.
@@ -49,6 +92,19 @@ impl Stroke {
 /// Left, top, width and height in pixels.
 pub type Region = [u32; 4];
 
+/// Pixels of a picture that a brush may reach on its way.
+fn reach(points: &[[f32; 3]], size: [u32; 2]) -> Option<Region> {
+    let side = |k: usize, size: u32| {
+        let low = points.iter().map(|p| p[k] - p[2] - 1.0);
+        let high = points.iter().map(|p| p[k] + p[2] + 1.0);
+        let low = low.fold(f32::INFINITY, f32::min).max(0.0).floor() as u32;
+        let high = high.fold(0.0, f32::max).ceil().min(size as f32) as u32;
+        (low < high).then(|| [low, high - low])
+    };
+    let [[left, width], [top, height]] = [side(0, size[0])?, side(1, size[1])?];
+    Some([left, top, width, height])
+}
+
 /// Transparent picture of the strokes on a photo, upright.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer(pub RgbaImage);
@@ -59,40 +115,14 @@ impl Layer {
         Self(RgbaImage::new(width, height))
     }
 
-    /// Draws a stroke; gives the region that it may have changed, none where it lies outside.
-    pub fn draw(&mut self, stroke: &Stroke) -> Option<Region> {
-        let region = self.reach(&stroke.points)?;
-        let [left, top, width, height] = region;
-        let mut shares = vec![0.0_f32; width as usize * height as usize];
-        for k in 0..stroke.points.len() {
-            let piece = [k.saturating_sub(1), k].map(|k| stroke.points[k]);
-            let Some([x0, y0, w, h]) = self.reach(&piece) else {
-                continue;
-            };
-            for (y, x) in (y0..y0 + h).flat_map(|y| (x0..x0 + w).map(move |x| (y, x))) {
-                let share = Stroke::share(piece, [x as f32 + 0.5, y as f32 + 0.5]);
-                let own = &mut shares[((y - top) * width + x - left) as usize];
-                *own = own.max(share);
-            }
+    /// Lays paint over what a mask covers; `color` is that of a pixel, none takes paint away.
+    pub fn lay(&mut self, mask: &Mask, color: &dyn Fn(u32, u32) -> Option<[u8; 3]>) {
+        let [left, top, width, _] = mask.region;
+        for (k, &share) in (0..).zip(&mask.shares) {
+            let (x, y) = (left + k % width, top + k / width);
+            let pixel = self.0.get_pixel_mut(x, y);
+            *pixel = laid_over(*pixel, color(x, y), share);
         }
-        for (k, share) in (0..).zip(shares) {
-            let pixel = self.0.get_pixel_mut(left + k % width, top + k / width);
-            *pixel = laid_over(*pixel, stroke.color, share);
-        }
-        Some(region)
-    }
-
-    /// Pixels that a brush may reach on its way.
-    fn reach(&self, points: &[[f32; 3]]) -> Option<Region> {
-        let side = |k: usize, size: u32| {
-            let low = points.iter().map(|p| p[k] - p[2] - 1.0);
-            let high = points.iter().map(|p| p[k] + p[2] + 1.0);
-            let low = low.fold(f32::INFINITY, f32::min).max(0.0).floor() as u32;
-            let high = high.fold(0.0, f32::max).ceil().min(size as f32) as u32;
-            (low < high).then(|| [low, high - low])
-        };
-        let [[left, width], [top, height]] = [side(0, self.0.width())?, side(1, self.0.height())?];
-        Some([left, top, width, height])
     }
 
     /// Pixels of a region.
@@ -179,37 +209,35 @@ mod tests {
 
     const RED: Option<[u8; 3]> = Some([200, 30, 20]);
 
-    fn stroke(color: Option<[u8; 3]>, points: &[[f32; 3]]) -> Stroke {
-        Stroke {
-            photo: 0,
-            color,
-            points: points.to_vec(),
-        }
+    fn draw(layer: &mut Layer, color: Option<[u8; 3]>, points: &[[f32; 3]]) -> Option<Region> {
+        let mask = Way(points.to_vec()).mask(layer.0.dimensions().into())?;
+        layer.lay(&mask, &|_, _| color);
+        Some(mask.region)
     }
 
     #[test]
     fn a_stroke_is_as_wide_as_its_brush_and_an_eraser_takes_it_away() {
         let mut layer = Layer::new([40, 20]);
         let across = [[5.0, 10.0, 3.0], [35.0, 10.0, 3.0]];
-        assert_eq!(layer.draw(&stroke(RED, &across)), Some([1, 6, 38, 8]));
+        assert_eq!(draw(&mut layer, RED, &across), Some([1, 6, 38, 8]));
         for (y, alpha) in [(5, 0), (7, 255), (10, 255), (12, 255), (14, 0)] {
             assert_eq!(layer.0.get_pixel(20, y).0[3], alpha, "{y}");
         }
         assert_eq!(layer.0.get_pixel(20, 10).0, [200, 30, 20, 255]);
         let before = layer.clone();
-        let region = layer.draw(&stroke(None, &[[20.0, 10.0, 5.0]])).unwrap();
+        let region = draw(&mut layer, None, &[[20.0, 10.0, 5.0]]).unwrap();
         assert_eq!(layer.0.get_pixel(20, 10).0, [0; 4]);
         assert_eq!(layer.0.get_pixel(10, 10).0[3], 255);
         layer.put(region, &before.cut(region));
         assert_eq!(layer, before);
-        layer.draw(&stroke(None, &[[20.0, 10.0, 50.0]]));
+        draw(&mut layer, None, &[[20.0, 10.0, 50.0]]);
         assert!(layer.is_empty());
     }
 
     #[test]
     fn strokes_outside_and_unsound_ones_change_nothing() {
         let mut layer = Layer::new([10, 10]);
-        assert_eq!(layer.draw(&stroke(RED, &[[-50.0, 5.0, 3.0]])), None);
+        assert_eq!(draw(&mut layer, RED, &[[-50.0, 5.0, 3.0]]), None);
         assert!(layer.is_empty());
         for points in [
             vec![],
@@ -219,15 +247,15 @@ mod tests {
             vec![[1e6, 0.0, 1.0]],
             vec![[1.0; 3]; POINTS + 1],
         ] {
-            assert!(!stroke(RED, &points).is_sound());
+            assert!(!Way(points).is_sound());
         }
-        assert!(stroke(RED, &[[1.0, 2.0, 3.0]]).is_sound());
+        assert!(Way(vec![[1.0, 2.0, 3.0]]).is_sound());
     }
 
     #[test]
     fn a_file_gives_back_the_layer_however_its_photo_lies() {
         let mut layer = Layer::new([12, 7]);
-        layer.draw(&stroke(RED, &[[3.0, 2.0, 2.0], [8.0, 2.5, 1.0]]));
+        draw(&mut layer, RED, &[[3.0, 2.0, 2.0], [8.0, 2.5, 1.0]]);
         for tag in 1..=8 {
             let upright = Orientation::of_tag(tag);
             let png = layer.to_png(upright).unwrap();

@@ -2,35 +2,28 @@
 
 use std::{
     ops::Range,
-    path::Path,
+    path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError},
 };
 
-use super::command;
+use super::command::{Choices, words};
 use crate::{
-    capture::{Dataset, Exposure, LoadOptions, Orientation},
+    capture::{Dataset, Exposure, Orientation},
     chroma::{
         ChromaSettings, SolverKind,
         teacher::{GrayImage, HintFolder, HintImage, Query, TeacherError},
     },
     eval::exposures,
-    frames::{SceneDrawer, ViewOf, believable},
+    frames::{SceneDrawer, ViewOf, believable, places},
     gpu::Gpu,
     raster::Raster,
     report::Report,
-    run::{RunError, TeachOptions, Teachers},
+    run::{RunError, TeachOptions, Teachers, ViewedScene},
     splats::{ShField, Splats},
-    store::{RunFolder, files, lock::RunLock},
-    subject::{
-        LockMode, Run,
-        scene::{Frame, read_scene},
-        sound::open_same,
-    },
+    store::{RunFolder, StoreError, files, lock::RunLock},
+    subject::scene::{Frame, read_scene},
     tell::{Event, Observer, Stage},
 };
-
-/// Bytes of photos that are kept.
-const CACHE_BYTES: usize = 256 << 20;
 
 /// A photo that can be painted on.
 pub struct PaintedPhoto {
@@ -46,9 +39,10 @@ pub struct PaintedPhoto {
 
 /// A run with its photos, as long as somebody paints.
 pub struct PaintScene {
+    pub viewed: Arc<ViewedScene>,
     pub folder: RunFolder,
     pub report: Report,
-    pub dataset: Dataset,
+    pub dataset: Arc<Dataset>,
     pub photos: Vec<PaintedPhoto>,
     pub luma: Splats,
     pub raster: Arc<Raster>,
@@ -58,8 +52,8 @@ pub struct PaintScene {
     pub believed: ShField,
     pub exposures: Vec<Exposure>,
     pub teachers: Mutex<Teachers>,
-    /// Words of the command that colors the run.
-    command: Vec<String>,
+    /// COLMAP folder, where one was named.
+    colmap: Option<PathBuf>,
     _lock: RunLock,
 }
 
@@ -73,16 +67,17 @@ impl PaintScene {
         colmap: Option<&Path>,
         observe: &mut Observer<'_>,
     ) -> Result<Self, RunError> {
-        observe(Event::begins(Stage::Model));
-        let Run { folder, report, .. } = Run::find(run, LockMode::Free)?;
+        let viewed = ViewedScene::open_run(run, colmap, observe)?;
+        let parts = viewed
+            .folder()
+            .zip(viewed.report())
+            .zip(viewed.dataset.as_ref());
+        let Some(((folder, report), dataset)) = parts else {
+            return Err(StoreError::NoRun.into());
+        };
+        let (folder, report, dataset) = (folder.clone(), report.clone(), dataset.clone());
         files::make_folder(&folder.hints())?;
         let lock = RunLock::take(&folder.paint())?;
-        let colmap_dir = colmap.unwrap_or(report.capture.path.as_ref()).to_owned();
-        let load = LoadOptions {
-            force: true,
-            ..report.capture.load.clone()
-        };
-        let dataset = open_same(&colmap_dir, &load, &report.capture, observe)?;
         let luma = read_scene(&folder.luma(), Frame::Own, observe)?
             .splats
             .to_luma();
@@ -99,10 +94,11 @@ impl PaintScene {
             exposures: exposures(&dataset, &report.luma.exposures),
             raster: report.luma.settings.raster(&gpu),
             photos: photos(&dataset)?,
-            dataset: dataset.caching(CACHE_BYTES),
+            dataset,
             teachers: Mutex::new(teachers),
-            command: command::words(&folder, &report, colmap),
+            colmap: colmap.map(Path::to_owned),
             luma,
+            viewed: Arc::new(viewed),
             folder,
             report,
             _lock: lock,
@@ -123,10 +119,14 @@ impl PaintScene {
     }
 
     /// Words of the command that colors the run, with the strokes in its folder if there are any.
-    pub fn command(&self, painted: bool) -> Vec<String> {
-        let hints = command::hints(&self.folder);
-        let hints = hints.into_iter().filter(|_| painted);
-        self.command.iter().cloned().chain(hints).collect()
+    pub fn command(&self, choices: &Choices, painted: bool) -> Vec<String> {
+        words(
+            &self.folder,
+            &self.report,
+            self.colmap.as_deref(),
+            choices,
+            painted,
+        )
     }
 
     /// The run's a and b as they would be with hints but without any: these are not made stronger.
@@ -142,6 +142,27 @@ impl PaintScene {
         let of_run = self.report.chroma.as_ref().filter(|_| !painted);
         let factor = of_run.map_or(1.0, |chroma| chroma.saturation);
         scaled(chroma, factor)
+    }
+
+    /// The photo that a view shows, and where a place of the view lies in it upright, in shares of
+    /// its sides.
+    pub fn mark(&self, view: usize, place: [f32; 2]) -> Option<([f32; 2], usize)> {
+        let photo = (self.photos.iter()).position(|photo| photo.views.contains(&view))?;
+        let of_photo = &self.photos[photo];
+        let seen = self.views(photo).swap_remove(view - of_photo.views.start);
+        let upright = seen.view.stance.upright;
+        let lying = upright.inverse().size(of_photo.size);
+        let side = [seen.camera.width, seen.camera.height];
+        let [x, y] = [0, 1].map(|k| place[k] * side[k] as f32);
+        let far = places(&seen, lying)
+            .into_iter()
+            .map(|[u, v]| (u - x).hypot(v - y));
+        let far = upright.turned(far.collect(), 1, lying);
+        let (nearest, _) = (far.iter().enumerate()).min_by(|a, b| a.1.total_cmp(b.1))?;
+        let [width, height] = of_photo.size.map(|side| side as usize);
+        let pixel = [nearest % width, nearest / width];
+        let share = |k: usize, side: usize| (pixel[k] as f32 + 0.5) / side as f32;
+        Some(([share(0, width), share(1, height)], photo))
     }
 
     /// Views of a photo.

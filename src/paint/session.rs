@@ -11,17 +11,20 @@ use std::{
     time::{Duration, Instant},
 };
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
-    layer::Stroke,
+    command::Choices,
+    free_view::ViewStroke,
+    layer::{Paint, Way},
     log::Act,
     pictures::{Colors, Pictures},
     scene::PaintScene,
-    strokes::AllStrokes,
+    strokes::{AllStrokes, Dab, Ink},
 };
 use crate::{
-    chroma::bake_rgb,
+    chroma::{at_middle_lightness, bake_rgb, shaded_at},
+    color::{lab_to_srgb, srgb_to_lab},
     run::RunError,
     splats::{ShField, Splats},
     store::StoreError,
@@ -29,6 +32,15 @@ use crate::{
     tell::Observer,
     tradeoff::shell_line,
 };
+
+/// A stroke on a photo, in pixels of its upright layer.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Stroke {
+    /// Index of the photo.
+    pub photo: usize,
+    pub paint: Paint,
+    pub points: Way,
+}
 
 /// State of the colors.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -71,8 +83,8 @@ pub(super) struct Base {
 pub struct Doubt {
     /// a and b that tint the Gaussians.
     pub tint: ShField,
-    /// Photos to paint next.
-    pub next: Vec<usize>,
+    /// Places to paint next, in shares of the photo's sides, and their photos.
+    pub next: Vec<([f32; 2], usize)>,
 }
 
 pub(super) struct State {
@@ -82,6 +94,7 @@ pub(super) struct State {
     pub colors: u64,
     pub phase: Phase,
     pub strokes: AllStrokes,
+    pub choices: Choices,
     pub base: Arc<Base>,
     pub shown: Arc<ShField>,
     /// Photos whose strokes the solver does not know.
@@ -100,7 +113,7 @@ pub(super) struct State {
 impl State {
     /// Words of the command that colors the run with what is painted now.
     pub fn command(&self, scene: &PaintScene) -> Vec<String> {
-        scene.command(self.strokes.painted().next().is_some())
+        scene.command(&self.choices, self.strokes.painted().next().is_some())
     }
 }
 
@@ -151,6 +164,7 @@ impl PaintSession {
             // Nobody knows whether these strokes are in the run's colors.
             saved: !hinted && strokes.painted().next().is_none(),
             strokes,
+            choices: Choices::of(&scene.report),
             look: false,
             doubt: None,
             drawn: None,
@@ -193,12 +207,67 @@ impl PaintSession {
     /// Draws a stroke, which is kept before this returns.
     ///
     /// # Errors
-    /// [`StoreError`] where it cannot be kept.
-    pub fn draw(&self, stroke: &Stroke) -> Result<(), StoreError> {
-        self.change(|state| {
-            if state.strokes.draw(&self.scene, stroke)? {
-                self.wake(state, stroke.photo);
+    /// [`RunError`] where it cannot be kept, or no teacher has colors for it.
+    pub fn draw(&self, stroke: &Stroke) -> Result<(), RunError> {
+        let Stroke {
+            photo,
+            paint,
+            points,
+        } = stroke;
+        let Some(mask) = points.mask(self.scene.photos[*photo].size) else {
+            return Ok(());
+        };
+        let ink = self.ink(*photo, *paint)?;
+        let photo = *photo;
+        self.lay(*paint, &[Dab { photo, mask, ink }])
+    }
+
+    /// Draws a stroke on the scene as strokes on photos that show it; the number of these.
+    ///
+    /// # Errors
+    /// As [`PaintSession::draw`].
+    pub fn draw_in_view(&self, stroke: &ViewStroke) -> Result<usize, RunError> {
+        let painted: BTreeSet<usize> = self.state().strokes.painted().collect();
+        // What is not painted cannot be erased.
+        let erases = stroke.paint == Paint::Nothing;
+        let found = stroke.on_photos(&self.scene, &|photo| !erases || painted.contains(&photo))?;
+        let mut dabs = Vec::new();
+        for (photo, mask, lightness) in found {
+            let ink = match stroke.paint {
+                Paint::Color(color) => Ink::Color(in_light(color, lightness)),
+                paint => self.ink(photo, paint)?,
+            };
+            dabs.push(Dab { photo, mask, ink });
+        }
+        if !dabs.is_empty() {
+            self.lay(stroke.paint, &dabs)?;
+        }
+        Ok(dabs.len())
+    }
+
+    fn ink(&self, photo: usize, paint: Paint) -> Result<Ink, RunError> {
+        Ok(match paint {
+            Paint::Color(color) => Ink::Color(color),
+            Paint::Nothing => Ink::Nothing,
+            Paint::Teacher => {
+                let name = &self.scene.photos[photo].name;
+                let failed = |reason: &str| StoreError::file(&self.scene.folder.hint(name), reason);
+                let png = self.picture(photo, Colors::Taught)?;
+                let png = png.ok_or_else(|| failed("no teacher has colors for this photo"))?;
+                let picture = image::load_from_memory(&png);
+                Ink::Picture(
+                    picture
+                        .map_err(|error| failed(&error.to_string()))?
+                        .into_rgb8(),
+                )
             }
+        })
+    }
+
+    fn lay(&self, paint: Paint, dabs: &[Dab]) -> Result<(), RunError> {
+        self.change(|state| {
+            state.strokes.draw(&self.scene, paint, dabs)?;
+            self.wake(state, dabs.iter().map(|dab| dab.photo));
             Ok(())
         })
     }
@@ -207,22 +276,31 @@ impl PaintSession {
     ///
     /// # Errors
     /// As [`PaintSession::draw`].
-    pub fn turn(&self, act: Act) -> Result<(), StoreError> {
+    pub fn turn(&self, act: Act) -> Result<(), RunError> {
         self.change(|state| {
-            if let Some(photo) = state.strokes.turn(&self.scene, act)? {
-                self.wake(state, photo);
+            let photos = state.strokes.turn(&self.scene, act)?;
+            if !photos.is_empty() {
+                self.wake(state, photos.into_iter());
             }
             Ok(())
         })
     }
 
-    /// Has the strokes on a photo looked at.
-    fn wake(&self, state: &mut State, photo: usize) {
-        state.dirty.insert(photo);
+    /// Has the strokes on some photos looked at.
+    fn wake(&self, state: &mut State, photos: impl Iterator<Item = usize>) {
+        state.dirty.extend(photos);
         state.phase = Phase::Solving;
         state.stroked = Some(Instant::now());
         state.saved = false;
         self.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// Takes options of the command that colors the run.
+    pub fn choose(&self, choices: Choices) {
+        self.change(|state| {
+            state.saved &= state.choices == choices;
+            state.choices = choices;
+        });
     }
 
     /// Has the run colored with the strokes.
@@ -253,6 +331,7 @@ impl PaintSession {
             "painted": state.strokes.painted().collect::<Vec<_>>(),
             "palette": state.strokes.log.palette,
             "saved": state.saved,
+            "choices": state.choices,
             "command": shell_line(&state.command(&self.scene)),
             "doubt": doubt.map(|(_, doubt)| &doubt.next),
         })
@@ -353,5 +432,29 @@ impl PaintSession {
             *value += new - old;
         }
         splats
+    }
+}
+
+/// A color of paint on what is as light as this.
+fn in_light(color: [u8; 3], lightness: f32) -> [u8; 3] {
+    let [own, a, b] = srgb_to_lab(color.map(|value| f64::from(value) / 255.0));
+    let middle = at_middle_lightness([a as f32, b as f32], own as f32);
+    let [a, b] = shaded_at(middle, lightness).map(f64::from);
+    let rgb = lab_to_srgb([f64::from(lightness), a, b]);
+    rgb.map(|value| (255.0 * value).round().clamp(0.0, 255.0) as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paint_is_darker_where_less_light_falls() {
+        let [red, dark] = [[200, 60, 50], in_light([200, 60, 50], 20.0)];
+        let [a, b] = [red, dark].map(|rgb| srgb_to_lab(rgb.map(|v| f64::from(v) / 255.0)));
+        assert!((b[0] - 20.0).abs() < 1.0, "{b:?}");
+        let [hue, darker] = [a, b].map(|[_, a, b]| b.atan2(a));
+        assert!((hue - darker).abs() < 0.05, "{a:?} {b:?}");
+        assert_eq!(in_light(red, a[0] as f32), red);
     }
 }

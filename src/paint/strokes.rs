@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use image::RgbaImage;
+use base64::{Engine, engine::general_purpose::STANDARD};
+use image::{ExtendedColorType, RgbImage, RgbaImage};
 
 use super::{
-    layer::{Layer, Region, Stroke},
-    log::{Act, Log},
+    layer::{Layer, Mask, Paint, Region, encoded},
+    log::{Act, Log, Part},
     scene::PaintScene,
 };
 use crate::{
@@ -17,20 +18,37 @@ use crate::{
 /// Strokes that can be undone.
 const UNDONE: usize = 200;
 
-/// A change of a layer.
-struct Change {
+/// What is laid over a layer.
+pub enum Ink {
+    /// sRGB.
+    Color([u8; 3]),
+    /// Pixels of a picture.
+    Picture(RgbImage),
+    /// Takes paint away.
+    Nothing,
+}
+
+/// Paint on a photo.
+pub struct Dab {
+    pub photo: usize,
+    pub mask: Mask,
+    pub ink: Ink,
+}
+
+/// Part of a layer that a stroke changed, with what is to be there once it is undone, or done
+/// again.
+struct Changed {
     photo: usize,
     region: Region,
-    /// Pixels before and after.
-    pixels: [RgbaImage; 2],
+    pixels: RgbaImage,
 }
 
 /// All strokes on a run.
 pub struct AllStrokes {
     /// Layers by photo.
     layers: BTreeMap<usize, Layer>,
-    /// Changes of this session, and the number of those that are not undone.
-    changes: Vec<Change>,
+    /// Changes, and the number of those that are not undone.
+    changes: Vec<Vec<Changed>>,
     done: usize,
     pub log: Log,
 }
@@ -43,11 +61,19 @@ impl AllStrokes {
             let bytes = input::read(&scene.folder.hint(&photo.name)).ok()?;
             Some((k, Layer::from_png(bytes, photo.size)?))
         });
+        let layers = kept.collect();
+        let mut log = Log::open(&scene.folder.paint_log());
+        let done = std::mem::take(&mut log.done);
+        // What comes before a change that cannot be undone cannot be either.
+        let known = done.iter().rev().take(UNDONE);
+        let known = known.map_while(|parts| changed(scene, parts));
+        let mut changes: Vec<Vec<Changed>> = known.collect();
+        changes.reverse();
         Self {
-            layers: kept.collect(),
-            changes: Vec::new(),
-            done: 0,
-            log: Log::open(&scene.folder.paint_log()),
+            layers,
+            done: changes.len(),
+            changes,
+            log,
         }
     }
 
@@ -66,58 +92,81 @@ impl AllStrokes {
         self.layers.get(&photo)
     }
 
-    /// Draws a stroke and keeps it; returns false where it lies outside.
+    fn layer_of(&self, scene: &PaintScene, photo: usize) -> Layer {
+        let layer = self.layers.get(&photo).cloned();
+        layer.unwrap_or_else(|| Layer::new(scene.photos[photo].size))
+    }
+
+    /// Draws one stroke, on one photo or several, and keeps it.
     ///
     /// # Errors
-    /// [`StoreError::File`] where it cannot be kept; it is not drawn then.
-    pub fn draw(&mut self, scene: &PaintScene, stroke: &Stroke) -> Result<bool, StoreError> {
-        let photo = stroke.photo;
-        let before = self.layers.get(&photo).cloned();
-        let before = before.unwrap_or_else(|| Layer::new(scene.photos[photo].size));
-        let mut layer = before.clone();
-        let Some(region) = layer.draw(stroke) else {
-            return Ok(false);
-        };
-        let change = Change {
-            photo,
-            region,
-            pixels: [before.cut(region), layer.cut(region)],
-        };
-        self.put(scene, photo, layer)?;
+    /// [`StoreError::File`] where it cannot be kept.
+    pub fn draw(
+        &mut self,
+        scene: &PaintScene,
+        paint: Paint,
+        dabs: &[Dab],
+    ) -> Result<(), StoreError> {
+        let (mut change, mut parts) = (Vec::new(), Vec::new());
+        for Dab { photo, mask, ink } in dabs {
+            let mut layer = self.layer_of(scene, *photo);
+            let pixels = layer.cut(mask.region);
+            layer.lay(mask, &|x, y| match ink {
+                Ink::Color(color) => Some(*color),
+                Ink::Picture(picture) => picture.get_pixel_checked(x, y).map(|pixel| pixel.0),
+                Ink::Nothing => None,
+            });
+            self.put(scene, *photo, layer)?;
+            parts.push(Part {
+                photo: scene.photos[*photo].name.clone(),
+                region: mask.region,
+                before: as_text(&pixels),
+            });
+            change.push(Changed {
+                photo: *photo,
+                region: mask.region,
+                pixels,
+            });
+        }
         self.changes.truncate(self.done);
         self.changes.push(change);
         if self.changes.len() > UNDONE {
             self.changes.remove(0);
         }
         self.done = self.changes.len();
-        let act = stroke.color.map_or(Act::Erase, |_| Act::Paint);
-        let name = &scene.photos[photo].name;
-        self.log.add(act, name, stroke.color, region)?;
-        Ok(true)
+        let (act, color) = match paint {
+            Paint::Color(color) => (Act::Paint, Some(color)),
+            Paint::Teacher => (Act::Keep, None),
+            Paint::Nothing => (Act::Erase, None),
+        };
+        self.log.add(act, color, parts)
     }
 
-    /// Takes the last change back, or does it again; the photo that it is on.
+    /// Takes the last change back, or does it again; the photos that it is on.
     ///
     /// # Errors
     /// As [`AllStrokes::draw`].
-    pub fn turn(&mut self, scene: &PaintScene, act: Act) -> Result<Option<usize>, StoreError> {
-        let (at, side) = match act {
-            Act::Undo => (self.done.checked_sub(1), 0),
-            _ => (Some(self.done), 1),
+    pub fn turn(&mut self, scene: &PaintScene, act: Act) -> Result<Vec<usize>, StoreError> {
+        let at = match act {
+            Act::Undo => self.done.checked_sub(1),
+            _ => Some(self.done),
         };
-        let Some((at, change)) = at.and_then(|at| Some((at, self.changes.get(at)?))) else {
-            return Ok(None);
+        let Some(at) = at.filter(|&at| at < self.changes.len()) else {
+            return Ok(Vec::new());
         };
-        let (photo, region) = (change.photo, change.region);
-        let size = scene.photos[photo].size;
-        let mut layer = self.layers.get(&photo).cloned();
-        let mut layer = layer.take().unwrap_or_else(|| Layer::new(size));
-        layer.put(region, &change.pixels[side]);
-        self.put(scene, photo, layer)?;
-        self.done = at + side;
-        let name = &scene.photos[photo].name;
-        self.log.add(act, name, None, region)?;
-        Ok(Some(photo))
+        let mut photos = Vec::new();
+        for k in 0..self.changes[at].len() {
+            let Changed { photo, region, .. } = self.changes[at][k];
+            let mut layer = self.layer_of(scene, photo);
+            let now = layer.cut(region);
+            layer.put(region, &self.changes[at][k].pixels);
+            self.put(scene, photo, layer)?;
+            self.changes[at][k].pixels = now;
+            photos.push(photo);
+        }
+        self.done = at + usize::from(act != Act::Undo);
+        self.log.add(act, None, Vec::new())?;
+        Ok(photos)
     }
 
     /// Keeps a layer on the disk; an empty one has no file.
@@ -136,4 +185,37 @@ impl AllStrokes {
         self.layers.insert(photo, layer);
         Ok(())
     }
+}
+
+/// Pixels as the log keeps them; none where nothing is painted.
+fn as_text(pixels: &RgbaImage) -> Option<String> {
+    let painted = pixels.pixels().any(|pixel| pixel.0[3] > 0);
+    let size = pixels.dimensions().into();
+    let png = painted.then(|| encoded(pixels, size, ExtendedColorType::Rgba8, None));
+    Some(STANDARD.encode(png?.ok()?))
+}
+
+/// The change of a line of the log; none where it is of other photos or sizes.
+fn changed(scene: &PaintScene, parts: &[Part]) -> Option<Vec<Changed>> {
+    let of = |part: &Part| {
+        let photo = scene
+            .photos
+            .iter()
+            .position(|photo| photo.name == part.photo)?;
+        let [left, top, width, height] = part.region;
+        let [within, below] = scene.photos[photo].size;
+        let inside = left.checked_add(width)? <= within && top.checked_add(height)? <= below;
+        let pixels = match &part.before {
+            _ if !inside => return None,
+            Some(text) => Layer::from_png(STANDARD.decode(text).ok()?, [width, height])?.0,
+            None => RgbaImage::new(width, height),
+        };
+        Some(Changed {
+            photo,
+            region: part.region,
+            pixels,
+        })
+    };
+    let parts = (!parts.is_empty()).then_some(parts)?;
+    parts.iter().map(of).collect()
 }

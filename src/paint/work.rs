@@ -26,7 +26,7 @@ use crate::{
 /// Pixels of a photo that colors are solved for while somebody paints, at most.
 const PIXELS: usize = 80_000;
 
-/// Photos that are marked to be painted next.
+/// Places that are marked to be painted next.
 const NEXT: usize = 3;
 
 /// Work that comes next.
@@ -177,13 +177,8 @@ impl PaintSession {
 
     fn find_doubt(&self, repainter: &Repainter<'_>) -> Result<(), RunError> {
         let (tint, views) = repainter.doubt(NEXT)?;
-        let photo = |view: &usize| {
-            self.scene
-                .photos
-                .iter()
-                .position(|photo| photo.views.contains(view))
-        };
-        let next = views.iter().filter_map(photo);
+        let marks = views.into_iter();
+        let next = marks.filter_map(|(view, place)| self.scene.mark(view, place));
         let next = next.collect();
         self.change(|state| {
             state.doubt = Some((state.colors, Arc::new(Doubt { tint, next })));

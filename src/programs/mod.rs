@@ -13,6 +13,7 @@ use std::{
     process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
         mpsc::{Receiver, channel},
     },
     thread,
@@ -25,6 +26,9 @@ use crate::disk;
 
 /// Program that reads and writes films.
 pub(crate) const FFMPEG: &str = "ffmpeg";
+
+/// Set for this program where it is to end as after Ctrl-C once its standard input ends.
+pub(crate) const TETHER: &str = "GS_CHROMA_TETHERED";
 
 /// Interval of polling a program that has closed its output.
 const PATIENCE: Duration = Duration::from_millis(5);
@@ -95,6 +99,30 @@ pub(crate) struct Program {
     /// Name on `PATH`, or path.
     name: OsString,
     arguments: Vec<OsString>,
+    /// True if it ends by itself once its standard input does.
+    tethered: bool,
+}
+
+/// What holds a program that ends by itself once this is cut, or gone.
+#[derive(Debug, Default)]
+pub(crate) struct Tether {
+    input: Mutex<Option<ChildStdin>>,
+    is_cut: AtomicBool,
+}
+
+impl Tether {
+    /// Lets the program end.
+    pub fn cut(&self) {
+        self.is_cut.store(true, Ordering::SeqCst);
+        drop(locked(&self.input).take());
+    }
+
+    fn hold(&self, input: Option<ChildStdin>) {
+        *locked(&self.input) = input;
+        if self.is_cut.load(Ordering::SeqCst) {
+            self.cut();
+        }
+    }
 }
 
 /// A program that runs.
@@ -117,6 +145,7 @@ impl Program {
         Self {
             name: name.into(),
             arguments: Vec::new(),
+            tethered: false,
         }
     }
 
@@ -141,6 +170,25 @@ impl Program {
     /// was said of the last [`said::KEPT_LINES`] lines.
     pub fn run(self, folder: &Path, heard: &mut dyn FnMut(&str)) -> Result<(), ProgramError> {
         let (running, _, output, error) = self.start(folder, Stdio::null())?;
+        let mut last = Last::default();
+        for (stream, line) in lines_of(output, error) {
+            heard(&line);
+            last.keep(stream, line);
+        }
+        self.judge(running.finish(), &last)
+    }
+
+    /// Runs this very program as [`Program::run`] does, but lets it end by itself, with a checkpoint,
+    /// once the tether is cut or this process is gone.
+    pub fn run_tethered(
+        mut self,
+        folder: &Path,
+        tether: &Tether,
+        heard: &mut dyn FnMut(&str),
+    ) -> Result<(), ProgramError> {
+        self.tethered = true;
+        let (running, input, output, error) = self.start(folder, Stdio::piped())?;
+        tether.hold(input);
         let mut last = Last::default();
         for (stream, line) in lines_of(output, error) {
             heard(&line);
@@ -221,13 +269,18 @@ impl Program {
             .stdin(input)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
+        if self.tethered {
+            command.env(TETHER, "1");
+        }
         // Listed before anybody can end it.
         let mut running = locked(&RUNNING);
         let mut child = command.spawn().map_err(|error| self.failed(error))?;
         let input = child.stdin.take();
         let pipes = child.stdout.take().zip(child.stderr.take());
         let child = Arc::new(Mutex::new(child));
-        running.push(child.clone());
+        if !self.tethered {
+            running.push(child.clone());
+        }
         drop(running);
         let running = Running { child };
         let (output, error) = pipes.ok_or_else(|| self.failed(io::ErrorKind::BrokenPipe.into()))?;

@@ -21,6 +21,15 @@ pub struct ChromaReport {
     pub strength: f32,
     /// Method of upsampling answers smaller than the photo.
     pub upsample: Upsample,
+    /// Profile of the networks, where it was given.
+    #[serde(default)]
+    pub teacher_profile: Option<String>,
+    /// Input size of the networks, where it was given, in pixels.
+    #[serde(default)]
+    pub teacher_size: Option<u32>,
+    /// Class that the networks were asked with, where it was given.
+    #[serde(default)]
+    pub teacher_class: Option<u16>,
     /// Views with painted hints.
     pub hints: usize,
     /// The folder of hints, absolute.

@@ -68,6 +68,13 @@ impl TeachOptions {
             teachers: teachers
                 .filter_map(|teacher| Some((teacher.path.as_ref()?.into(), teacher.weight)))
                 .collect(),
+            settings: chroma.map_or_else(TeacherSettings::default, |chroma| TeacherSettings {
+                profile: chroma.teacher_profile.clone(),
+                size: chroma.teacher_size,
+                class: chroma.teacher_class,
+                upsample: chroma.upsample,
+                ..TeacherSettings::default()
+            }),
             strength: chroma.map_or(1.0, |chroma| chroma.strength),
             ..Self::default()
         }

@@ -13,7 +13,7 @@ use super::{
     teach::{TeachOptions, Teachers},
 };
 use crate::{
-    capture::{CaptureError, Dataset, Photo},
+    capture::{CaptureError, Dataset, LoadOptions, Photo},
     chroma::{
         native_rgb,
         teacher::{GrayImage, Query},
@@ -24,19 +24,20 @@ use crate::{
     report::{Report, to_image},
     splats::Splats,
     store::{RunFolder, StoreError, fingerprint::check_poses, originals::OriginalFiles},
-    subject::{LockMode, Opened, SceneKind, scene::open},
+    subject::{LockMode, Opened, Run, SceneKind, scene::open, sound::open_same},
     tell::{Event, Observer, Stage},
 };
 
-/// Bytes of photos that are kept: those around the one that is looked at.
-const CACHE_BYTES: usize = 64 << 20;
+/// Bytes of photos that are kept: those around the one that is looked at, and those of which a
+/// stroke changes the colors.
+const CACHE_BYTES: usize = 256 << 20;
 
 /// A run or a splat file that is looked at.
 pub struct ViewedScene {
     /// Name in titles.
     pub name: String,
     /// Views with cameras and photos; none where the COLMAP folder is not there.
-    pub dataset: Option<Dataset>,
+    pub dataset: Option<Arc<Dataset>>,
     opened: Opened,
     scenes: Vec<SceneKind>,
     teachers: Mutex<LazyTeachers>,
@@ -65,6 +66,32 @@ impl ViewedScene {
     ) -> Result<Self, RunError> {
         observe(Event::begins(Stage::Model));
         let opened = Opened::find(run, LockMode::Free)?;
+        let dataset = views(&opened, colmap, observe)?;
+        Ok(Self::of(opened, dataset))
+    }
+
+    /// Opens a run whose photos are to be worked on: they have to be there, and those that were
+    /// trained on.
+    ///
+    /// # Errors
+    /// [`RunError`].
+    pub(crate) fn open_run(
+        run: Option<&Path>,
+        colmap: Option<&Path>,
+        observe: &mut Observer<'_>,
+    ) -> Result<Self, RunError> {
+        observe(Event::begins(Stage::Model));
+        let run = Run::find(run, LockMode::Free)?;
+        let capture = &run.report.capture;
+        let load = LoadOptions {
+            force: true,
+            ..capture.load.clone()
+        };
+        let dataset = open_same(&run.colmap(colmap), &load, capture, observe)?;
+        Ok(Self::of(Opened::Run(Box::new(run)), Some(dataset)))
+    }
+
+    fn of(opened: Opened, dataset: Option<Dataset>) -> Self {
         let (of, scenes) = match &opened {
             // What a file shows is only known once it is read; it is shown as it is.
             Opened::File(path) => (path.clone(), vec![SceneKind::Color]),
@@ -80,14 +107,19 @@ impl ViewedScene {
             }
         };
         let name = of.file_name().unwrap_or(of.as_os_str()).to_string_lossy();
-        Ok(Self {
+        Self {
             name: name.into_owned(),
-            dataset: views(&opened, colmap, observe)?,
+            dataset: dataset.map(|dataset| Arc::new(dataset.caching(CACHE_BYTES))),
             scenes,
             teachers: Mutex::new(LazyTeachers::NotYet),
             _kept: opened.keep(OriginalFiles::default()).keep(),
             opened,
-        })
+        }
+    }
+
+    /// The run's folder; none of a splat file.
+    pub(crate) fn folder(&self) -> Option<&RunFolder> {
+        self.opened.folder()
     }
 
     /// The run's report; none of a splat file.
@@ -236,7 +268,7 @@ fn views(
     };
     let found = open(&opened.colmap(colmap)?, &load, &mut told).and_then(|dataset| {
         check_poses(&dataset.capture, opened.photos())?;
-        Ok(dataset.caching(CACHE_BYTES))
+        Ok(dataset)
     });
     match found {
         Err(error) if colmap.is_none() => {

@@ -7,10 +7,37 @@ pub const PAGE: &str = include_str!("../../assets/viewer/index.html");
 /// Style sheet.
 pub const STYLE: &str = include_str!("../../assets/viewer/style.css");
 
-/// Script and style of paint mode, which a page that is sent does not have.
-pub const PAINT: [&str; 2] = [
-    include_str!("../../assets/viewer/paint.js"),
-    include_str!("../../assets/viewer/paint.css"),
+/// Files of paint mode, which a page that is sent does not have, and their names.
+pub const PAINT_NAMES: [&str; 10] = [
+    "paint.js",
+    "brush.js",
+    "choices.js",
+    "color.js",
+    "easel.js",
+    "mixer.js",
+    "pixels.js",
+    "strip.js",
+    "talk.js",
+    "paint.css",
+];
+pub const PAINT: [&str; 10] = [
+    include_str!("../../assets/viewer/paint/paint.js"),
+    include_str!("../../assets/viewer/paint/brush.js"),
+    include_str!("../../assets/viewer/paint/choices.js"),
+    include_str!("../../assets/viewer/paint/color.js"),
+    include_str!("../../assets/viewer/paint/easel.js"),
+    include_str!("../../assets/viewer/paint/mixer.js"),
+    include_str!("../../assets/viewer/paint/pixels.js"),
+    include_str!("../../assets/viewer/paint/strip.js"),
+    include_str!("../../assets/viewer/paint/talk.js"),
+    include_str!("../../assets/viewer/paint/paint.css"),
+];
+
+/// Page, script and style of the studio.
+pub const STUDIO: [&str; 3] = [
+    include_str!("../../assets/viewer/studio/index.html"),
+    include_str!("../../assets/viewer/studio/studio.js"),
+    include_str!("../../assets/viewer/studio/studio.css"),
 ];
 
 /// The modules, each behind those that it imports.

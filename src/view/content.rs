@@ -41,11 +41,10 @@ pub trait Content: Send + Sync {
 /// The answer to a request. Paths are compared with those that there are, and never lead into a
 /// folder.
 pub fn answer(content: &dyn Content, request: &Request) -> Response {
-    let text = |kind, body: &str| Response::ok(kind, body.as_bytes());
     match request.path.as_str() {
-        "/" => text("text/html; charset=utf-8", assets::PAGE),
-        "/viewer.css" => text("text/css; charset=utf-8", assets::STYLE),
-        "/viewer.js" => Response::ok("text/javascript; charset=utf-8", assets::script()),
+        "/" => Response::asset("", assets::PAGE),
+        path @ "/viewer.css" => Response::asset(path, assets::STYLE),
+        path @ "/viewer.js" => Response::asset(path, &assets::script()),
         "/scene.json" => match content.about() {
             Ok(told) => tagged(told.to_string()),
             Err(error) => failed(&error),
@@ -111,7 +110,7 @@ fn failed(error: &RunError) -> Response {
 
 /// A run or a splat file that stays as it is.
 pub struct RunContent {
-    viewed: ViewedScene,
+    viewed: Arc<ViewedScene>,
     /// The scenes by kind, packed when they are asked for the first time.
     packed: [Mutex<Option<Packed>>; 2],
 }
@@ -133,12 +132,17 @@ impl RunContent {
         let Some(first) = viewed.scenes().next() else {
             return Err(ViewerError::Nothing(viewed.name));
         };
-        let content = Self {
-            viewed,
-            packed: Default::default(),
-        };
+        let content = Self::unread(Arc::new(viewed));
         content.packed(first, observe)?;
         Ok(content)
+    }
+
+    /// Content of a run, of whose scenes none is read yet.
+    pub fn unread(viewed: Arc<ViewedScene>) -> Self {
+        Self {
+            viewed,
+            packed: Default::default(),
+        }
     }
 
     fn packed(
@@ -177,12 +181,12 @@ impl Content for RunContent {
 
     fn photo(&self, view: usize) -> Result<Option<GrayImage>, RunError> {
         let photo = self.viewed.photo(view)?;
-        Ok(photo.and_then(|photo| gray(&photo, upright(self.viewed.dataset.as_ref(), view))))
+        Ok(photo.and_then(|photo| gray(&photo, upright(self.viewed.dataset.as_deref(), view))))
     }
 
     fn teacher(&self, view: usize) -> Result<Option<RgbImage>, RunError> {
         let picture = self.viewed.teacher(view)?;
-        let upright = upright(self.viewed.dataset.as_ref(), view);
+        let upright = upright(self.viewed.dataset.as_deref(), view);
         Ok(picture.map(|picture| upright.image(picture.into()).into_rgb8()))
     }
 }

@@ -80,6 +80,16 @@ impl Response {
         }
     }
 
+    /// A file of the page, by the extension of its name.
+    pub fn asset(name: &str, text: &str) -> Self {
+        let kind = match name.rsplit_once('.') {
+            Some((_, "js")) => "text/javascript; charset=utf-8",
+            Some((_, "css")) => "text/css; charset=utf-8",
+            _ => "text/html; charset=utf-8",
+        };
+        Self::ok(kind, text.as_bytes())
+    }
+
     /// A line that says why there is none.
     pub fn refused(status: &'static str, why: impl Into<String>) -> Self {
         Self {

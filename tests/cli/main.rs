@@ -53,6 +53,7 @@ mod solver;
 mod soundness;
 mod splat_file;
 mod strokes;
+mod studio;
 mod teach;
 mod teach_together;
 #[cfg(unix)]

@@ -13,7 +13,7 @@ use super::{
 };
 
 /// All commands.
-pub const COMMANDS: [&str; 18] = [
+pub const COMMANDS: [&str; 19] = [
     "auto",
     "prepare",
     "plan",
@@ -22,6 +22,7 @@ pub const COMMANDS: [&str; 18] = [
     "merge",
     "colorize",
     "teacher",
+    "studio",
     "view",
     "render",
     "frames",

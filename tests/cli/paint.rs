@@ -41,14 +41,8 @@ struct Easel {
 impl Easel {
     fn of(place: &Place) -> Self {
         let (page, line) = Page::and_line(place, &["runs/garden", "--paint"]);
-        let secret = line
-            .split('#')
-            .nth(1)
-            .and_then(|rest| rest.split(' ').next());
-        Self {
-            page,
-            secret: secret.expect("a secret in the address").to_owned(),
-        }
+        let secret = secret_in(&line);
+        Self { page, secret }
     }
 
     fn post(&self, what: &str, body: &Value) -> u16 {
@@ -57,13 +51,26 @@ impl Easel {
         self.post_with(what, &own, body)
     }
 
+    /// What is answered to something that is sent.
+    fn answer(&self, what: &str, body: &Value) -> Value {
+        let host = format!("127.0.0.1:{}", self.page.port);
+        let own = format!("Origin: http://{host}\r\nX-Secret: {}\r\n", self.secret);
+        let (code, answer) = self.sent(what, &own, body);
+        assert_eq!(code, 200, "{}", String::from_utf8_lossy(&answer));
+        serde_json::from_slice(&answer).expect("JSON")
+    }
+
     fn post_with(&self, what: &str, headers: &str, body: &Value) -> u16 {
+        self.sent(what, headers, body).0
+    }
+
+    fn sent(&self, what: &str, headers: &str, body: &Value) -> (u16, Vec<u8>) {
         let (host, body) = (format!("127.0.0.1:{}", self.page.port), body.to_string());
         let length = body.len();
         let head = format!(
             "POST /paint/{what} HTTP/1.1\r\nHost: {host}\r\n{headers}Content-Length: {length}\r\n\r\n"
         );
-        parts(&self.page.send((head + &body).as_bytes())).0
+        parts(&self.page.send((head + &body).as_bytes()))
     }
 
     fn news(&self, version: u64) -> Value {
@@ -104,10 +111,20 @@ impl Easel {
     }
 }
 
+/// The secret in an address.
+pub fn secret_in(line: &str) -> String {
+    let secret = line.split('#').nth(1);
+    let secret = secret.and_then(|rest| rest.split(' ').next());
+    secret.expect("a secret in the address").to_owned()
+}
+
 /// Across the pumpkin of the third photo, which is 108 × 72.
-fn on_pumpkin(color: Option<[u8; 3]>) -> Value {
-    let points: Vec<[f32; 3]> = (0..12).map(|k| [63.0 + k as f32, 62.0, 1.5]).collect();
-    json!({ "photo": 2, "color": color, "points": points })
+fn across_pumpkin() -> Vec<[f32; 3]> {
+    (0..12).map(|k| [63.0 + k as f32, 62.0, 1.5]).collect()
+}
+
+fn on_pumpkin(paint: Value) -> Value {
+    json!({ "photo": 2, "paint": paint, "points": across_pumpkin() })
 }
 
 /// All files of the run but those of painting and the answers that are kept.
@@ -135,7 +152,7 @@ fn the_scene_follows_strokes_which_outlive_a_crash_and_the_run_stays_until_it_is
     easel.once("ready");
     // Only the page may send anything.
     let host = format!("Origin: http://127.0.0.1:{}\r\n", easel.page.port);
-    let stroke = on_pumpkin(Some(VIOLET));
+    let stroke = on_pumpkin(json!({ "color": VIOLET }));
     assert_eq!(easel.post_with("stroke", &host, &stroke), 403);
     let foreign = format!(
         "Origin: http://evil.example\r\nX-Secret: {}\r\n",
@@ -144,7 +161,8 @@ fn the_scene_follows_strokes_which_outlive_a_crash_and_the_run_stays_until_it_is
     assert_eq!(easel.post_with("stroke", &foreign, &stroke), 403);
     for wrong in [
         json!({}),
-        json!({ "photo": 99, "color": null, "points": [[1, 1, 1]] }),
+        json!({ "photo": 99, "paint": "nothing", "points": [[1, 1, 1]] }),
+        json!({ "photo": 2, "paint": "teacher", "points": [] }),
     ] {
         assert_eq!(easel.post("stroke", &wrong), 400);
     }
@@ -201,6 +219,15 @@ fn the_scene_follows_strokes_which_outlive_a_crash_and_the_run_stays_until_it_is
     let easel = Easel::of(&place);
     let ready = easel.once("ready");
     assert_eq!(ready["painted"], json!([2]));
+    // What was done before can still be undone.
+    assert_eq!((&ready["undo"], &ready["redo"]), (&json!(1), &json!(0)));
+    let hint = place.path("runs/garden/paint/hints/garden_02.jpg.png");
+    let layer = std::fs::read(&hint).expect("the strokes");
+    assert_eq!(easel.post("undo", &json!({})), 200);
+    assert!(!hint.exists());
+    assert_eq!(easel.post("redo", &json!({})), 200);
+    assert!(std::fs::read(&hint).expect("the strokes") == layer);
+    easel.once("settled");
     let again = easel.photos();
     assert!(
         mean_delta(&painted, &again) < NEAR,
@@ -220,6 +247,103 @@ fn the_scene_follows_strokes_which_outlive_a_crash_and_the_run_stays_until_it_is
     let words: Vec<&str> = command.split(' ').skip(1).collect();
     place.succeed(&words);
     assert!(place.read("runs/garden/chroma.npy") == saved);
+}
+
+/// Opaque pixels of a photo's strokes.
+fn painted(place: &Place, photo: &str) -> Vec<(u32, u32, [u8; 3])> {
+    let path = place.path("runs/garden/paint/hints").join(photo);
+    let Ok(layer) = image::open(path) else {
+        return Vec::new();
+    };
+    let layer = layer.into_rgba8();
+    let pixels = layer
+        .enumerate_pixels()
+        .filter(|(.., pixel)| pixel.0[3] > 128);
+    pixels
+        .map(|(x, y, pixel)| (x, y, [pixel.0[0], pixel.0[1], pixel.0[2]]))
+        .collect()
+}
+
+#[test]
+fn strokes_on_the_scene_come_to_photos_and_the_command_is_as_it_was_chosen() {
+    let place = garden();
+    let easel = Easel::of(&place);
+    let ready = easel.once("ready");
+    let photo = "garden_02.jpg.png";
+    // From where the third photo was taken, a stroke on the scene is one on that photo.
+    let mut camera = easel.page.about()["cameras"][2].clone();
+    for key in ["name", "split", "psnr"] {
+        camera.as_object_mut().expect("a camera").remove(key);
+    }
+    let points = across_pumpkin();
+    let stroke = json!({ "camera": camera, "paint": { "color": VIOLET }, "points": points });
+    let found = easel.answer("view-stroke", &stroke)["photos"].as_u64();
+    assert!((1..=3).contains(&found.expect("a number")), "{found:?}");
+    let projected = painted(&place, photo);
+    let settled = easel.once("settled");
+    assert_eq!(settled["undo"], 1);
+    assert_eq!(
+        settled["painted"].as_array().map(Vec::len),
+        found.map(|n| n as usize)
+    );
+    assert_eq!(easel.post("undo", &json!({})), 200);
+    assert!(painted(&place, photo).is_empty());
+    assert_eq!(
+        easel.post("stroke", &on_pumpkin(json!({ "color": VIOLET }))),
+        200
+    );
+    let direct = painted(&place, photo);
+    let same = |a: &(u32, u32, [u8; 3])| direct.iter().any(|b| (a.0, a.1) == (b.0, b.1));
+    let both = projected.iter().filter(|pixel| same(pixel)).count();
+    let all = projected.len() + direct.len() - both;
+    assert!(2 * both > all, "{both} of {all}");
+    // From behind a wall nothing can be painted, and by no camera either.
+    let mut away = stroke.clone();
+    away["camera"]["translation"] = json!([0, 0, -1000]);
+    assert_eq!(easel.answer("view-stroke", &away)["photos"], 0);
+    away["camera"]["rotation"] = json!([1, 1, 1, 1, 1, 1, 1, 1, 1]);
+    assert_eq!(easel.post("view-stroke", &away), 400);
+
+    // The teacher's colors where they are to be kept.
+    assert_eq!(easel.post("stroke", &on_pumpkin(json!("teacher"))), 200);
+    let (_, png) = easel.page.get("/paint/teacher/2");
+    let teacher = image::load_from_memory(&png)
+        .expect("a picture")
+        .into_rgb8();
+    // Under the middle of the brush, where nothing of the stroke before is left.
+    let kept = painted(&place, photo);
+    let middle = kept.iter().find(|(x, y, _)| (*x, *y) == (68, 61));
+    assert_eq!(
+        middle.map(|(.., color)| *color),
+        Some(teacher.get_pixel(68, 61).0)
+    );
+
+    let mut choices = ready["choices"].clone();
+    choices["strength"] = json!(0.5);
+    choices["robust"] = json!(null);
+    choices["sh_degree"] = json!(1);
+    assert_eq!(easel.post("choices", &choices), 200);
+    let command = easel.news(0)["command"]
+        .as_str()
+        .expect("a command")
+        .to_owned();
+    for words in [
+        "--strength 0.5",
+        "--robust off",
+        "--sh-degree 1",
+        "--hints ",
+    ] {
+        assert!(command.contains(words), "{command}");
+    }
+    choices["strength"] = json!(7);
+    assert_eq!(easel.post("choices", &choices), 400);
+    assert_eq!(easel.post("save", &json!({})), 200);
+    easel.once("saved");
+    drop(easel);
+    let chroma = place.report("runs/garden")["chroma"].clone();
+    assert_eq!(chroma["strength"], 0.5);
+    assert_eq!(chroma["settings"]["sh_degree"], 1);
+    assert_eq!(chroma["settings"]["robust"], json!(null));
 }
 
 /// Colors of a pixel that are plainly others.

@@ -39,7 +39,12 @@ impl Page {
 
     /// The same with the line that names its address.
     pub fn and_line(place: &Place, arguments: &[&str]) -> (Self, String) {
-        let mut command = place.command(&[&["view", "--no-open"], arguments].concat());
+        Self::serving(place, &[&["view", "--no-open"], arguments].concat())
+    }
+
+    /// A command that serves a page, with the line that names its address.
+    pub fn serving(place: &Place, arguments: &[&str]) -> (Self, String) {
+        let mut command = place.command(arguments);
         let spawned = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
         let mut program = spawned.expect("the program starts");
         let mut line = String::new();

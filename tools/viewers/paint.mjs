@@ -3,8 +3,9 @@
 //   node paint.mjs URL [--out DIR] [--photo N] [--wheel U,V] [--stroke X,Y,X,Y] [--size N] [--shots]
 //
 // Draws one stroke, places in shares of the photo, waits until the colors settle, undoes and does it
-// again. Prints one line of JSON: milliseconds until the page shows the preview and the settled
-// colors, colors under the stroke, and errors; status 1 where there are any.
+// again; then draws the same on the scene from a view beside, and undoes that. Prints one line of
+// JSON: milliseconds until the page shows the preview and the settled colors, colors under the stroke,
+// what the page says of the stroke on the scene, and errors; status 1 where there are any.
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { parseArgs } from "node:util";
@@ -97,6 +98,33 @@ try {
   found.undone = await under(middle);
   await page.keyboard.press("Control+Shift+Z");
   await page.waitForFunction(() => document.getElementById("redo").disabled);
+  await said("Settled");
+
+  // The same from a view beside the photo's.
+  const strokes = () => page.evaluate(() => fetch("paint/news/0").then((answer) => answer.json()).then(({ undo }) => undo));
+  const before = await strokes();
+  await page.keyboard.press("v");
+  await page.waitForTimeout(1500);
+  await page.evaluate(() => window.gsChroma.turn(0.06, 0.03));
+  await page.waitForTimeout(500);
+  await page.keyboard.press("b");
+  const shown = await page.evaluate(() => window.gsChroma.seen());
+  const on = (x, y) => [shown.x + x * shown.width, shown.y + y * shown.height];
+  await page.mouse.move(...on(x0, y0));
+  await page.mouse.down();
+  await page.mouse.move(...on(x1, y1), { steps: 25 });
+  await shot("scene-stroke");
+  const drawn = Date.now();
+  await page.mouse.up();
+  await said(" photo");
+  found.scene_ms = Date.now() - drawn;
+  found.scene = await page.locator("#status").textContent();
+  await said("Settled");
+  await page.waitForTimeout(600);
+  await shot("scene-settled");
+  found.scene_changes = (await strokes()) - before;
+  await page.keyboard.press("Control+z");
+  await page.waitForFunction(() => !document.getElementById("redo").disabled);
 } catch (error) {
   found.errors.push(String(error));
 } finally {

@@ -1,5 +1,7 @@
 //! The report of a coloring.
 
+use std::fs;
+
 use super::{
     open::{Coloring, Supervised},
     solve::Solved,
@@ -57,6 +59,15 @@ impl Coloring<'_> {
             teachers: self.teachers.describe(),
             strength: teach.strength,
             upsample: teach.settings.upsample,
+            teacher_profile: teach.settings.profile.clone().map(|profile| {
+                let manifest = profile
+                    .ends_with(".toml")
+                    .then(|| fs::canonicalize(&profile));
+                let path = manifest.and_then(|found| found.ok()?.to_str().map(str::to_owned));
+                path.unwrap_or(profile)
+            }),
+            teacher_size: teach.settings.size,
+            teacher_class: teach.settings.class,
             hints: supervised.taught.hinted,
             hint_folder: teach.hints.as_ref().and_then(|folder| {
                 let found = folder.canonicalize();

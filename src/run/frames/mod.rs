@@ -373,12 +373,10 @@ fn open_teachers(
     dataset: &Dataset,
     observe: &mut Observer<'_>,
 ) -> Result<Option<Teachers>, RunError> {
-    let mut teach = TeachOptions {
-        settings: options.teacher_settings.clone(),
-        ..TeachOptions::of_run(report)
-    };
+    let mut teach = TeachOptions::of_run(report);
     if let Some(path) = &options.teacher {
         teach.teachers = vec![(path.clone(), 1.0)];
+        teach.settings = options.teacher_settings.clone();
     }
     if teach.teachers.is_empty() {
         return Ok(None);

@@ -8,7 +8,7 @@ use super::literals::{literals, without_tests};
 /// does not know each other.
 const FLOORS: [&[&str]; 15] = [
     &["cli"],
-    &["auto", "paint"],
+    &["auto", "paint", "studio"],
     &["tradeoff", "view"],
     &["run", "prepare"],
     &["subject"],
