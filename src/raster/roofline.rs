@@ -79,6 +79,7 @@ pub fn minimum_words(kernel: &str, load: &Load) -> Option<f64> {
         "compact" => splats + 3.0 * visible,
         "scan_reduce" => scanned,
         "scan_sums" => 2.0 * scanned / 1024.0,
+        "scan_whole" => 3.0 * scanned,
         "scan_apply" => 2.0 * scanned,
         "sort_count" => keys,
         "sort_scatter" => 4.0 * keys,
