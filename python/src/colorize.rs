@@ -6,7 +6,7 @@ use gs_chroma::{
     capture::Dataset as Photos,
     chroma::{
         self, ChromaError, ChromaProgress, ChromaSettings, ColorizeEvent, Degree, Distill,
-        SolverKind, native_rgb, teach, teacher::TeacherSettings,
+        NoChromaCheckpoints, SolverKind, native_rgb, teach, teacher::TeacherSettings,
     },
     raster::{Raster, RasterOptions, RenderedImage, SceneRenderer},
     splats::{self, sh::coefficient_count},
@@ -57,7 +57,7 @@ impl Colored {
     /// SH coefficients of CIELAB a and b, float32 `[N, (degree + 1)², 2]`, from which RGB is made.
     #[getter]
     fn chroma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
-        let field = &self.colored.chroma;
+        let field = &self.colored.distilled.chroma;
         let shape = [
             self.colored.splats.len(),
             coefficient_count(field.degree),
@@ -75,13 +75,13 @@ impl Colored {
     /// Settings of the solver, as a dictionary.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        to_python(py, &self.colored.settings)
+        to_python(py, &self.colored.distilled.settings)
     }
 
     /// Factor that makes colors as strong as the teacher's; it is in `splats` and `chroma`.
     #[getter]
     fn saturation(&self) -> f64 {
-        self.colored.saturation
+        self.colored.distilled.saturation
     }
 
     /// The photo of a view in the scene's colors, at its own lightness: uint8 `[height, width, 3]`,
@@ -97,7 +97,10 @@ impl Colored {
     }
 
     fn __repr__(&self) -> String {
-        let (count, views) = (self.colored.splats.len(), self.colored.colored_views);
+        let (count, views) = (
+            self.colored.splats.len(),
+            self.colored.distilled.colored_views,
+        );
         format!("Colored({count} Gaussians, from {views} colored views)")
     }
 }
@@ -107,7 +110,7 @@ impl Colored {
     fn painted(&self, view: usize) -> PyResult<Vec<[f32; 3]>> {
         let photo = python(self.dataset.photo(view))?;
         let raster = Arc::new(Raster::with(&gpu()?, self.drawn));
-        let (splats, field) = (&self.colored.splats, &self.colored.chroma);
+        let (splats, field) = (&self.colored.splats, &self.colored.distilled.chroma);
         let camera = &self.dataset.cameras[view];
         let renderer = SceneRenderer::of(&raster, splats, &[field], self.dataset.extent);
         let chroma = python(renderer.and_then(|mut renderer| renderer.render(camera)))?;
@@ -286,14 +289,14 @@ impl Job {
             reporter.tell(Progress::of("teacher", view, total, name))
         })?;
         let distill = Distill {
-            raster,
             dataset,
-            luma: &self.luma,
             supervision: &supervision,
             sh_degree: self.sh_degree,
             correct_views: self.correct_views,
         };
-        distill.run(settings, &mut |event| {
+        let scene = (raster, &self.luma);
+        let keeps = &mut NoChromaCheckpoints;
+        distill.color_gaussians(scene, None, keeps, settings, &mut |event| {
             reporter.tell(match event {
                 ColorizeEvent::Asked { view, total } => Progress::of("teacher", view, total, ""),
                 ColorizeEvent::Trying { progress, .. } => solving("SH degree", progress),

@@ -4,9 +4,9 @@
 use std::{ops::RangeInclusive, time::Instant};
 
 use super::{
-    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, Recipe, Targets,
-    Task,
+    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, Recipe, Targets, Task,
     checkpoint::{Interruptible, SolverState},
+    field::FrozenField,
     loss::Space,
     passes::{LossOutput, LossSettings, Passes},
 };
@@ -51,14 +51,14 @@ impl<'a> AdamSolver<'a> {
     /// As [`IrlsSolver::new`](super::IrlsSolver::new).
     ///
     /// # Panics
-    /// Where the Gaussians wait on the host.
+    /// Where the primitives wait on the host.
     pub fn new(
-        frozen: &'a FrozenViews,
+        frozen: &'a dyn FrozenField,
         settings: ChromaSettings,
         targets: &'a Targets,
         tasks: Vec<Task>,
     ) -> Result<Self, ChromaError> {
-        let start = ShField::zeros(frozen.geometry.count, settings.sh_degree, 2);
+        let start = ShField::zeros(frozen.primitives().count(), settings.sh_degree, 2);
         let schedule = AdamSchedule {
             iterations: settings.iterations,
             rates: settings.rates,
@@ -81,7 +81,7 @@ impl<'a> AdamSolver<'a> {
     /// # Errors
     /// As [`AdamSolver::new`].
     pub fn by_recipe(
-        frozen: &'a FrozenViews,
+        frozen: &'a dyn FrozenField,
         recipe: &Recipe,
         targets: &'a Targets,
         tasks: Vec<Task>,
@@ -114,24 +114,24 @@ impl<'a> AdamSolver<'a> {
     }
 
     fn along(
-        frozen: &'a FrozenViews,
+        frozen: &'a dyn FrozenField,
         schedule: AdamSchedule,
         targets: &'a Targets,
         tasks: Vec<Task>,
         start: &ShField,
     ) -> Result<Self, ChromaError> {
-        assert!(frozen.streamed().is_none(), "all Gaussians on the device");
-        let gpu = &frozen.raster.gpu;
+        assert!(frozen.streamed().is_none(), "all primitives on the device");
+        let gpu = frozen.gpu();
         let sizes = [1 + schedule.scales.end(), REPORT_EVERY];
         let [_, planes] = schedule.planes;
         let passes = Passes::new(frozen, targets, tasks, start, planes, Space::Lab, sizes)?;
         let adam = Adam::new(
             gpu,
-            &frozen.kernels.adam,
+            &frozen.kernels().adam,
             &passes.status,
             &passes.gradient,
             &passes.field.planes,
-            frozen.geometry.count,
+            frozen.primitives().count(),
         )?;
         Ok(Self {
             passes,
@@ -143,7 +143,7 @@ impl<'a> AdamSolver<'a> {
     }
 
     fn gpu(&self) -> &'a Gpu {
-        &self.passes.frozen.raster.gpu
+        self.passes.frozen.gpu()
     }
 
     /// Distills to the last iteration, telling `observe` now and then.
@@ -235,7 +235,7 @@ impl<'a> AdamSolver<'a> {
             let done = iteration * (coarsest - finest + 1) + coarsest - scale;
             let step = u32::try_from(done + 1).unwrap_or(u32::MAX);
             let mut recorder = Recorder::new(gpu);
-            let kernel = &self.passes.frozen.kernels.adam;
+            let kernel = &self.passes.frozen.kernels().adam;
             self.adam.record(gpu, kernel, &mut recorder, step, &rates);
             recorder.submit();
         }
@@ -291,7 +291,7 @@ impl Interruptible for AdamSolver<'_> {
 /// # Errors
 /// As [`solve`](super::solve); [`ChromaError::Cancelled`] where `observe` says so.
 pub fn follow_recipe(
-    frozen: &FrozenViews,
+    frozen: &dyn FrozenField,
     recipe: &Recipe,
     targets: &Targets,
     tasks: Vec<Task>,

@@ -3,10 +3,10 @@
 use std::ops::ControlFlow;
 
 use super::{
-    ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, FrozenViews, IrlsSolver, LEAST_GAIN,
+    ChosenDegree, ChromaError, ChromaProgress, ChromaSettings, FrozenField, IrlsSolver, LEAST_GAIN,
     Targets, Task, solve,
 };
-use crate::splats::{Splats, sh};
+use crate::splats::sh;
 
 /// Every so many views are held back to judge by.
 const HELD_BACK: usize = 5;
@@ -17,11 +17,10 @@ const HELD_BACK: usize = 5;
 /// # Errors
 /// As [`solve`].
 pub fn choose_degree(
-    frozen: &FrozenViews,
+    frozen: &dyn FrozenField,
     settings: &ChromaSettings,
     targets: &Targets,
     tasks: &[Task],
-    luma: &Splats,
     observe: &mut dyn FnMut(u32, ChromaProgress) -> ControlFlow<()>,
 ) -> Result<ChosenDegree, ChromaError> {
     let (mut kept, mut held_back) = (Vec::new(), Vec::new());
@@ -43,7 +42,7 @@ pub fn choose_degree(
             ..settings.clone()
         };
         let observe = &mut |progress| observe(degree, progress);
-        let found = solve(frozen, &settings, targets, kept.clone(), luma, observe)?;
+        let found = solve(frozen, &settings, targets, kept.clone(), observe)?;
         let mut judge = IrlsSolver::new(frozen, &settings, targets, held_back.clone())?;
         let loss = judge.objective(&found.chroma)?;
         let gains = (losses.last()).is_none_or(|before| loss < before * (1.0 - LEAST_GAIN));

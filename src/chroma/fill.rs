@@ -1,8 +1,8 @@
 //! Color for Gaussians that the views hardly show: that of their neighbors, and of those that
 //! are like them.
 
-use super::likeness::likely_colors;
-use crate::splats::{ShField, Splats, nearest_neighbors, sh};
+use super::{field::Primitives, likeness::likely_colors};
+use crate::splats::{ShField, nearest_neighbors, sh};
 
 /// Neighbors that a Gaussian looks to.
 const NEIGHBORS: usize = 8;
@@ -34,16 +34,16 @@ const SWEEPS: usize = 200;
 ///
 /// # Panics
 /// When the three have not the same number of Gaussians.
-pub fn fill_unseen(luma: &Splats, chroma: &mut ShField, seen: &[f32]) {
-    let count = luma.len();
+pub fn fill_unseen(primitives: &Primitives, chroma: &mut ShField, seen: &[f32]) {
+    let count = primitives.count();
     assert_eq!(count, seen.len());
     let stride = 2 * sh::coefficient_count(chroma.degree);
     assert_eq!(chroma.coefficients.len(), count * stride);
-    let neighbors = nearest_neighbors(&luma.means, NEIGHBORS);
+    let neighbors = nearest_neighbors(&primitives.centers, NEIGHBORS);
     let found: Vec<[f64; 2]> = (chroma.coefficients.chunks_exact(stride))
         .map(|c| [f64::from(c[0]), f64::from(c[1])])
         .collect();
-    let likely = likely_colors(luma, &neighbors, &found, seen, DECIDED);
+    let likely = likely_colors(primitives, &neighbors, &found, seen, DECIDED);
     // What each Gaussian holds on to, and how strongly.
     let own: Vec<([f64; 2], f64)> = (0..count)
         .map(|i| {
@@ -58,7 +58,7 @@ pub fn fill_unseen(luma: &Splats, chroma: &mut ShField, seen: &[f32]) {
             }
         })
         .collect();
-    let filled = relaxed(&own, &edges(luma, &neighbors), found);
+    let filled = relaxed(&own, &edges(primitives, &neighbors), found);
     for (i, out) in chroma.coefficients.chunks_exact_mut(stride).enumerate() {
         let sure = seen[i].min(1.0);
         out[0] = filled[i][0] as f32;
@@ -71,8 +71,8 @@ pub fn fill_unseen(luma: &Splats, chroma: &mut ShField, seen: &[f32]) {
 
 /// Neighbors of each Gaussian, and what their word weighs; both ends weigh an edge alike, so that
 /// sweeps descend one energy.
-fn edges(luma: &Splats, neighbors: &[Vec<u32>]) -> Vec<Vec<(u32, f64)>> {
-    let gray = |i: usize| sh::C0 * f64::from(luma.sh.of(i)[0]);
+fn edges(primitives: &Primitives, neighbors: &[Vec<u32>]) -> Vec<Vec<(u32, f64)>> {
+    let gray = |i: usize| sh::C0 * f64::from(primitives.luma[i]);
     let mut edges: Vec<Vec<(u32, f64)>> = vec![Vec::new(); neighbors.len()];
     for (i, others) in neighbors.iter().enumerate() {
         for &j in others {
@@ -119,7 +119,11 @@ fn relaxed(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::splats::fixtures::row;
+    use crate::splats::fixtures;
+
+    fn row(grays: &[f32]) -> Primitives {
+        Primitives::from(&fixtures::row(grays))
+    }
 
     fn chroma(values: &[[f32; 2]]) -> ShField {
         ShField {

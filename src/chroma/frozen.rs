@@ -2,10 +2,14 @@
 //! once where the device has room, and lent to whoever solves or draws on it. Where it has no
 //! room for all Gaussians, they wait on the host, and those that a view may show come for it.
 
-use std::sync::Arc;
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    sync::Arc,
+};
 
 use super::{
     ChromaError, ChromaKernels,
+    field::{DrawBuffers, Drawing, FrozenField, Primitives},
     frozen_view::Frozen,
     memory::{Demand, MemoryBudget, MinimumMemory},
 };
@@ -13,10 +17,10 @@ use crate::{
     capture::Camera,
     gpu::{Gpu, GpuError, Recorder},
     raster::{
-        Field, Geometry, Layer, Lists, Load, Raster, RenderedImage, Streamed, UNREACHED,
-        ViewUniform, blend_depth, constants::NEAR_SHARE, depths,
+        AdjointScratch, Canvas, ChromaAdjoint, Geometry, Layer, Lists, Load, Raster, Streamed,
+        UNREACHED, ViewUniform, blend_depth, constants::NEAR_SHARE, depths,
     },
-    splats::{ShField, Splats, sh},
+    splats::Splats,
 };
 
 /// Counts that are on their way from the device at a time.
@@ -29,20 +33,13 @@ struct HostScene {
     cameras: Vec<Camera>,
 }
 
-/// Harmonics to be drawn over frozen geometry, on the device or on the host as this is.
-pub(super) enum Colors<'a> {
-    /// Harmonics of all Gaussians, on the device.
-    Device(Field),
-    /// Harmonics of all Gaussians, on the host.
-    Host(&'a ShField),
-}
-
-/// Frozen geometry before cameras.
+/// Gaussians with frozen geometry before cameras.
 pub struct FrozenViews {
-    pub(super) raster: Arc<Raster>,
-    pub(super) kernels: ChromaKernels,
+    raster: Arc<Raster>,
+    kernels: ChromaKernels,
+    primitives: Arc<Primitives>,
     /// Geometry of all Gaussians, or of those that the view before showed.
-    pub(super) geometry: Geometry,
+    geometry: Geometry,
     /// All Gaussians, where they wait on the host.
     streamed: Option<HostScene>,
     /// `[views][scales]`, full size first.
@@ -137,7 +134,7 @@ impl FrozenViews {
 
         let streams = streamed.is_some();
         let demand = Demand::of(geometry.count, splats.sh.degree, &views, room, streams);
-        let pinned = demand.pinned(&views, room.limit)?;
+        let pinned = demand.pinned(room.limit)?;
         for view in views[..pinned].iter_mut().flatten() {
             let lists = Lists::new(raster, &geometry, view.uniform.tile_count(), view.entries)?;
             let mut recorder = Recorder::new(gpu);
@@ -152,7 +149,8 @@ impl FrozenViews {
         Ok(Self {
             raster: raster.clone(),
             kernels: ChromaKernels::new(gpu),
-            demand: demand.bytes(&views, pinned),
+            primitives: Arc::new(Primitives::from(splats)),
+            demand: demand.bytes(pinned),
             streamed,
             geometry,
             views,
@@ -161,76 +159,17 @@ impl FrozenViews {
         })
     }
 
-    /// Number of Gaussians.
-    pub fn splat_count(&self) -> usize {
-        match &self.streamed {
-            Some(on_host) => on_host.scene.len(),
-            None => self.geometry.count,
-        }
-    }
-
-    /// Number of Gaussians on the device at a time, at most, if they wait on the host.
-    pub fn streamed(&self) -> Option<usize> {
-        self.streamed.as_ref().map(|_| self.geometry.count)
-    }
-
-    /// Puts those on the device that a view may show, where they wait on the host, and tells
-    /// which they are.
-    pub(super) fn put(&self, view: usize) -> Option<Vec<usize>> {
-        let on_host = self.streamed.as_ref()?;
-        let shown = on_host.shown(view);
-        self.geometry.put(self.gpu(), &on_host.scene.chosen(&shown));
-        Some(shown)
-    }
-
-    /// Harmonics of all Gaussians, to be drawn.
-    pub(super) fn colors<'a>(&self, field: &'a ShField) -> Result<Colors<'a>, ChromaError> {
-        Ok(match self.streamed {
-            Some(_) => Colors::Host(field),
-            None => Colors::Device(Field::upload(self.gpu(), field)?),
-        })
-    }
-
-    /// The device that holds the buffers.
-    pub fn gpu(&self) -> &Gpu {
-        &self.raster.gpu
-    }
-
-    /// Number of views.
-    pub fn len(&self) -> usize {
-        self.views.len()
-    }
-
-    /// Returns true if there are no views; never.
-    pub fn is_empty(&self) -> bool {
-        self.views.is_empty()
-    }
-
-    /// Views whose lists and targets stay on the device: the first so many.
-    pub fn pinned(&self) -> usize {
-        self.pinned
-    }
-
-    /// Bytes of the device that stage 2 takes at most, as estimated before they were.
-    pub fn demand(&self) -> u64 {
-        self.demand
-    }
-
-    /// Scales of each view.
-    pub(super) fn scales(&self) -> usize {
-        self.views[0].len()
-    }
-
-    pub(super) fn uniform(&self, view: usize, scale: usize) -> &ViewUniform {
+    fn uniform(&self, view: usize, scale: usize) -> &ViewUniform {
         &self.views[view][scale].uniform
     }
 
-    pub(super) fn is_pinned(&self, view: usize) -> bool {
-        view < self.pinned
+    /// A view whose lists stay on the device.
+    fn stays(&self, view: usize) -> Option<usize> {
+        (view < self.pinned).then_some(view)
     }
 
     /// The lists that a view is drawn with.
-    pub(super) fn lists(&self, view: usize, scale: usize) -> Option<&Lists> {
+    fn lists(&self, view: usize, scale: usize) -> Option<&Lists> {
         self.views[view][scale]
             .lists
             .as_ref()
@@ -238,7 +177,7 @@ impl FrozenViews {
     }
 
     /// Makes a view's lists hold it, to draw harmonics of `sh_degree`.
-    pub(super) fn list(&self, view: usize, scale: usize, sh_degree: u32, recorder: &mut Recorder) {
+    fn list(&self, view: usize, scale: usize, sh_degree: u32, recorder: &mut Recorder) {
         let frozen = &self.views[view][scale];
         let Some(lists) = self.lists(view, scale) else {
             return;
@@ -252,10 +191,71 @@ impl FrozenViews {
             lists.record(&self.raster, recorder);
         }
     }
+}
 
-    /// Makes the lists that stay anew, to draw harmonics of `sh_degree`: a Gaussian whose color
-    /// could not be drawn, as a step that goes too far has them, was taken out of them.
-    pub(super) fn relist(&self, sh_degree: u32) {
+impl FrozenField for FrozenViews {
+    fn gpu(&self) -> &Gpu {
+        &self.raster.gpu
+    }
+
+    fn kernels(&self) -> &ChromaKernels {
+        &self.kernels
+    }
+
+    fn primitives(&self) -> &Arc<Primitives> {
+        &self.primitives
+    }
+
+    fn views(&self) -> usize {
+        self.views.len()
+    }
+
+    fn size(&self, view: usize, scale: usize) -> [u32; 2] {
+        self.uniform(view, scale).size
+    }
+
+    fn bind<'a>(
+        &'a self,
+        views: &[usize],
+        buffers: &DrawBuffers<'_>,
+    ) -> Result<Box<dyn Drawing + 'a>, ChromaError> {
+        Ok(Box::new(GaussianDrawing::new(self, views, buffers)?))
+    }
+
+    fn depth(&self, view: usize) -> Result<Vec<f32>, ChromaError> {
+        let lists = self.lists(view, 0).ok_or(ChromaError::NoViews)?;
+        let uniform = self.uniform(view, 0);
+        let (pixels, tiles) = (vec![UNREACHED; uniform.pixel_count()], uniform.tile_count());
+        self.put(view);
+        let mut recorder = Recorder::new(self.gpu());
+        self.list(view, 0, 0, &mut recorder);
+        let image = blend_depth(&self.raster, lists, &pixels, tiles, &mut recorder)?;
+        recorder.submit();
+        Ok(depths(image.read(self.gpu())?))
+    }
+
+    fn pinned(&self) -> usize {
+        self.pinned
+    }
+
+    fn demand(&self) -> u64 {
+        self.demand
+    }
+
+    fn streamed(&self) -> Option<usize> {
+        self.streamed.as_ref().map(|_| self.geometry.count)
+    }
+
+    fn put(&self, view: usize) -> Option<Vec<usize>> {
+        let on_host = self.streamed.as_ref()?;
+        let shown = on_host.shown(view);
+        self.geometry.put(self.gpu(), &on_host.scene.chosen(&shown));
+        Some(shown)
+    }
+
+    /// Makes the lists that stay anew: a Gaussian whose color could not be drawn, as a step that
+    /// goes too far has them, was taken out of them.
+    fn restore(&self, sh_degree: u32) {
         for view in 0..self.pinned {
             let mut recorder = Recorder::new(&self.raster.gpu);
             for (scale, frozen) in self.views[view].iter().enumerate() {
@@ -268,16 +268,9 @@ impl FrozenViews {
         }
     }
 
-    /// Entries of the longest lists of these views.
-    pub(super) fn capacity(&self, views: impl Iterator<Item = usize>) -> usize {
-        let lists = views.flat_map(|view| (0..self.scales()).map(move |scale| (view, scale)));
-        let capacities = lists.filter_map(|(view, scale)| Some(self.lists(view, scale)?.capacity));
-        capacities.max().unwrap_or(0)
-    }
-
-    /// Work of a dispatch, the mean over these views at so many scales.
-    pub(super) fn load(&self, views: impl Iterator<Item = usize>, scales: usize) -> Load {
-        let passes: Vec<&Frozen> = views.flat_map(|view| &self.views[view][..scales]).collect();
+    fn load(&self, views: &[usize], scales: usize) -> Load {
+        let passes = views.iter().flat_map(|&view| &self.views[view][..scales]);
+        let passes: Vec<&Frozen> = passes.collect();
         let mean = |of: &dyn Fn(&Frozen) -> usize| {
             passes.iter().map(|frozen| of(frozen) as f64).sum::<f64>() / passes.len().max(1) as f64
         };
@@ -291,76 +284,85 @@ impl FrozenViews {
             ..Load::default()
         }
     }
+}
 
-    /// Draws harmonics as a view sees them at full size.
-    pub(super) fn draw(
-        &self,
-        view: usize,
-        fields: &[&Colors<'_>],
-    ) -> Result<Vec<RenderedImage>, GpuError> {
-        let Some(lists) = self.lists(view, 0) else {
-            return Ok(Vec::new());
-        };
-        let shown = self.put(view).unwrap_or_default();
-        let drawn = (fields.iter()).map(|colors| self.picture(view, lists, colors, &shown));
-        drawn.collect()
-    }
+/// The layer of a view at a scale, and its adjoint where it is needed.
+type Bound = (Layer, Option<ChromaAdjoint>);
 
-    /// Median depth of a view at full size, as [`SceneRenderer::depth`] has it.
-    ///
-    /// [`SceneRenderer::depth`]: crate::raster::SceneRenderer::depth
-    pub(super) fn depth(&self, view: usize) -> Result<Vec<f32>, ChromaError> {
-        let lists = self.lists(view, 0).ok_or(ChromaError::NoViews)?;
-        let uniform = self.uniform(view, 0);
-        let (pixels, tiles) = (vec![UNREACHED; uniform.pixel_count()], uniform.tile_count());
-        self.put(view);
-        let mut recorder = Recorder::new(self.gpu());
-        self.list(view, 0, 0, &mut recorder);
-        let image = blend_depth(&self.raster, lists, &pixels, tiles, &mut recorder)?;
-        recorder.submit();
-        Ok(depths(image.read(self.gpu())?))
-    }
+/// Views of Gaussians that are drawn with certain buffers.
+struct GaussianDrawing<'a> {
+    frozen: &'a FrozenViews,
+    sh_degree: u32,
+    /// `[scales]` of each view that stays, and once for all that take turns.
+    bound: BTreeMap<Option<usize>, Vec<Bound>>,
+}
 
-    /// Picture of harmonics in a view, `shown` being on the device where Gaussians wait on the
-    /// host.
-    fn picture(
-        &self,
-        view: usize,
-        lists: &Lists,
-        colors: &Colors<'_>,
-        shown: &[usize],
-    ) -> Result<RenderedImage, GpuError> {
-        let gpu = &self.raster.gpu;
-        let uniform = self.uniform(view, 0);
-        let (pixels, tiles) = (uniform.pixel_count(), uniform.tile_count());
-        let chosen;
-        let field = match colors {
-            Colors::Device(field) => field,
-            Colors::Host(field) => {
-                let mut some = field.chosen(shown);
-                let planes = field.channels * sh::coefficient_count(field.degree);
-                some.coefficients.resize(planes * self.geometry.count, 0.0);
-                chosen = Field::upload(gpu, &some)?;
-                &chosen
-            }
+impl<'a> GaussianDrawing<'a> {
+    fn new(
+        frozen: &'a FrozenViews,
+        views: &[usize],
+        buffers: &DrawBuffers<'_>,
+    ) -> Result<Self, ChromaError> {
+        let &DrawBuffers {
+            field,
+            images,
+            adjoint,
+        } = buffers;
+        let (raster, geometry) = (&frozen.raster, &frozen.geometry);
+        let (gpu, count, scales) = (&raster.gpu, geometry.count, images.len());
+        let canvas = |image| Canvas::of(gpu, field.kind, count, image);
+        let canvases = images.iter().map(canvas).collect::<Result<Vec<_>, _>>()?;
+        let all = (views.iter()).flat_map(|&view| (0..scales).map(move |scale| (view, scale)));
+        let lists = |(view, scale)| frozen.lists(view, scale);
+        let capacity = all.filter_map(lists).map(|lists| lists.capacity).max();
+        let scratch = |_| AdjointScratch::color(gpu, count, capacity.unwrap_or(0));
+        let scratch = adjoint.map(scratch).transpose()?;
+        let bind = |lists: &Lists, canvas: Canvas| -> Bound {
+            let layer = Layer::on(raster, geometry, lists, field, canvas, lists.max_tiles());
+            let back = adjoint
+                .zip(scratch.clone())
+                .map(|((gradient, sums), scratch)| {
+                    ChromaAdjoint::new(raster, geometry, lists, &layer, gradient, scratch, sums)
+                });
+            (layer, back)
         };
-        let layer = Layer::new(&self.raster, &self.geometry, lists, field, pixels, tiles)?;
-        let mut recorder = Recorder::new(gpu);
-        self.list(view, 0, field.degree, &mut recorder);
-        layer.record(&self.raster, &mut recorder);
-        recorder.submit();
-        let picture = RenderedImage {
-            width: uniform.size[0],
-            height: uniform.size[1],
-            channels: field.kind.channels(),
-            pixels: layer.read_image(gpu, pixels)?,
-        };
-        drop(layer);
-        if self.streamed.is_some() {
-            // The next one finds the room of this one.
-            gpu.wait()?;
+        let mut bound = BTreeMap::new();
+        for &view in views {
+            let Entry::Vacant(place) = bound.entry(frozen.stays(view)) else {
+                continue;
+            };
+            let scales = canvases.iter().enumerate().map(|(scale, canvas)| {
+                let lists = frozen.lists(view, scale).ok_or(ChromaError::NoViews)?;
+                Ok(bind(lists, canvas.clone()))
+            });
+            place.insert(scales.collect::<Result<_, ChromaError>>()?);
         }
-        Ok(picture)
+        Ok(Self {
+            frozen,
+            sh_degree: field.degree,
+            bound,
+        })
+    }
+}
+
+impl Drawing for GaussianDrawing<'_> {
+    fn draw(&self, view: usize, scale: usize, recorder: &mut Recorder) -> Result<(), ChromaError> {
+        let (layer, _) = &self.bound[&self.frozen.stays(view)][scale];
+        self.frozen.list(view, scale, self.sh_degree, recorder);
+        layer.record(&self.frozen.raster, recorder);
+        Ok(())
+    }
+
+    fn adjoint(
+        &self,
+        view: usize,
+        scale: usize,
+        recorder: &mut Recorder,
+    ) -> Result<(), ChromaError> {
+        if let (_, Some(adjoint)) = &self.bound[&self.frozen.stays(view)][scale] {
+            adjoint.record(&self.frozen.raster, recorder);
+        }
+        Ok(())
     }
 }
 

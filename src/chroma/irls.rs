@@ -9,9 +9,9 @@ use std::{
 };
 
 use super::{
-    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, Correction, FrozenViews, Targets,
-    Task,
+    ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, Correction, Targets, Task,
     checkpoint::{Interruptible, Rounds, SolverState},
+    field::FrozenField,
     lbfgs::LbfgsState,
     loss::Space,
     passes::{LossOutput, LossSettings, Passes},
@@ -84,12 +84,12 @@ impl<'a> IrlsSolver<'a> {
     /// [`ChromaError::NoViews`] without tasks, [`ChromaError::WrongSize`] when a target
     /// has not its camera's size, [`ChromaError::Gpu`].
     pub fn new(
-        frozen: &'a FrozenViews,
+        frozen: &'a dyn FrozenField,
         settings: &ChromaSettings,
         targets: &'a Targets,
         tasks: Vec<Task>,
     ) -> Result<Self, ChromaError> {
-        let start = ShField::zeros(frozen.splat_count(), settings.sh_degree, 2);
+        let start = ShField::zeros(frozen.primitives().count(), settings.sh_degree, 2);
         Self::starting_at(frozen, settings, targets, tasks, &start)
     }
 
@@ -99,7 +99,7 @@ impl<'a> IrlsSolver<'a> {
     /// # Errors
     /// As [`IrlsSolver::new`].
     pub fn starting_at(
-        frozen: &'a FrozenViews,
+        frozen: &'a dyn FrozenField,
         settings: &ChromaSettings,
         targets: &'a Targets,
         tasks: Vec<Task>,
@@ -108,8 +108,8 @@ impl<'a> IrlsSolver<'a> {
         let planes = start.channels * sh::coefficient_count(settings.sh_degree.min(start.degree));
         let sizes = [1, tasks.len()];
         let passes = Passes::new(frozen, targets, tasks, start, planes, Space::Rgb, sizes)?;
-        let views = passes.tasks.iter().map(|task| frozen.uniform(task.view, 0));
-        let pixels = views.map(|view| view.pixel_count()).max().unwrap_or(1);
+        let pixels = passes.tasks.iter().map(|task| frozen.pixels(task.view, 0));
+        let pixels = pixels.max().unwrap_or(1);
         let units = match passes.field.kind {
             ColorKind::Rgb => RGB_UNITS * RGB_UNITS,
             ColorKind::Chroma | ColorKind::Luma => 1.0,
@@ -120,7 +120,7 @@ impl<'a> IrlsSolver<'a> {
             anchor: settings.anchor,
         };
         Ok(Self {
-            steps: Steps::new(&frozen.kernels.lbfgs, &passes, priors)?,
+            steps: Steps::new(&frozen.kernels().lbfgs, &passes, priors)?,
             passes,
             settings: settings.clone(),
             pixels,
@@ -164,7 +164,7 @@ impl<'a> IrlsSolver<'a> {
     }
 
     fn gpu(&self) -> &'a Gpu {
-        &self.passes.frozen.raster.gpu
+        self.passes.frozen.gpu()
     }
 
     /// Lets no unknown fall below these, planes as the unknowns are.
@@ -209,7 +209,7 @@ impl<'a> IrlsSolver<'a> {
             let mut state = self.steps.step(&mut self.passes)?;
             let accepted = state.moved.is_some();
             if !accepted {
-                self.passes.frozen.relist(self.passes.field.degree);
+                self.passes.frozen.restore(self.passes.field.degree);
             }
             self.correct(round, accepted);
             self.done = round + 1;
@@ -258,7 +258,7 @@ impl<'a> IrlsSolver<'a> {
             corrections.undo(&mut recorder);
         }
         if accepted && self.correction_is_due(round) {
-            corrections.solve(&self.passes.frozen.kernels.correction, &mut recorder);
+            corrections.solve(&self.passes.frozen.kernels().correction, &mut recorder);
             self.corrected = true;
             self.steps.changed(self.passes.frozen.gpu());
         }
@@ -278,7 +278,7 @@ impl<'a> IrlsSolver<'a> {
         let state = self.steps.end(&mut self.passes)?;
         let corrected = std::mem::take(&mut self.corrected);
         if state.moved.is_none() {
-            self.passes.frozen.relist(self.passes.field.degree);
+            self.passes.frozen.restore(self.passes.field.degree);
             if corrected {
                 let mut recorder = Recorder::new(self.gpu());
                 self.passes.corrections.undo(&mut recorder);
@@ -301,7 +301,7 @@ impl<'a> IrlsSolver<'a> {
         self.draw(None, LossOutput::Loss)?;
         self.spent = spent;
         self.steps.restart(gpu);
-        self.passes.frozen.relist(self.passes.field.degree);
+        self.passes.frozen.restore(self.passes.field.degree);
         Ok(mean(&self.passes.log.read_later(gpu).wait(gpu)?))
     }
 
@@ -315,7 +315,7 @@ impl<'a> IrlsSolver<'a> {
             // The sums are of the step that was undone, where hardly a color was met.
             self.draw(self.robust(), LossOutput::Gradient)?;
         }
-        let count = self.passes.frozen.splat_count();
+        let count = self.passes.frozen.primitives().count();
         let diagonal = self.passes.curvature()?;
         // One pixel of weight one whose residual is the typical one.
         let pixel = 0.5 / self.pixels as f64 / TYPICAL_RESIDUAL * sh::C0;

@@ -79,8 +79,8 @@ pub(super) struct Demand {
     pub entries: usize,
     /// Bytes that do not depend on which views stay.
     fixed: u64,
-    /// A wanted pixel's.
-    of_pixel: u64,
+    /// Those of each view that stays.
+    of_views: Vec<u64>,
     /// One view's lists and targets, for all that take turns.
     turns: u64,
     /// True if the Gaussians wait on the host.
@@ -133,6 +133,10 @@ impl Demand {
         let of_pixel = 4 * (1 + u64::from(room.weighted));
         // On its way as well.
         let wanted = (1 + u64::from(streams)) * of_pixel * pixels[0] as u64;
+        let of_scale = |frozen: &Frozen| {
+            Lists::bytes(splats, frozen.uniform.tile_count(), frozen.entries)
+                + of_pixel * frozen.uniform.pixel_count() as u64
+        };
         Self {
             splats,
             tiles,
@@ -140,34 +144,48 @@ impl Demand {
             fixed: Geometry::bytes(splats)
                 + Corrections::bytes(views.len())
                 + solving.max(drawing).max(baking),
-            of_pixel,
+            of_views: (views.iter().map(|view| view.iter().map(of_scale).sum())).collect(),
             streams,
             turns: Lists::bytes(splats, tiles, entries) + wanted,
         }
     }
 
-    /// Bytes of a view that stays.
-    fn of_view(&self, view: &[Frozen]) -> u64 {
-        let of_scale = |frozen: &Frozen| {
-            Lists::bytes(self.splats, frozen.uniform.tile_count(), frozen.entries)
-                + self.of_pixel * frozen.uniform.pixel_count() as u64
-        };
-        view.iter().map(of_scale).sum()
+    /// Demand of views of so many pixels that are drawn on the host.
+    pub fn on_host(primitives: usize, pixels: &[usize], room: MemoryBudget) -> Self {
+        let unknowns = room.color.channels() * sh::coefficient_count(room.sh_degree);
+        let most = pixels.iter().copied().max().unwrap_or(0);
+        let picture = 4 * ((room.color.stride() + COLOR_FIGURES) * most) as u64;
+        let of_pixel = 4 * (1 + u64::from(room.weighted));
+        Self {
+            splats: primitives,
+            tiles: 0,
+            entries: 0,
+            fixed: super::lbfgs::bytes(primitives, unknowns)
+                + Corrections::bytes(pixels.len())
+                + picture,
+            of_views: pixels
+                .iter()
+                .map(|&pixels| of_pixel * pixels as u64)
+                .collect(),
+            turns: of_pixel * most as u64,
+            streams: false,
+        }
     }
 
     /// With so many views kept.
-    pub fn bytes(&self, views: &[Vec<Frozen>], pinned: usize) -> u64 {
-        let turns = if pinned < views.len() { self.turns } else { 0 };
-        let kept: u64 = views[..pinned].iter().map(|view| self.of_view(view)).sum();
-        self.fixed + turns + kept
+    pub fn bytes(&self, pinned: usize) -> u64 {
+        let (kept, rest) = self.of_views.split_at(pinned);
+        let turns = if rest.is_empty() { 0 } else { self.turns };
+        self.fixed + turns + kept.iter().sum::<u64>()
     }
 
     /// Number of views that stay on the device. The order of the views never changes, so that
     /// keeping the first ones saves as many uploads as any choice.
-    pub fn pinned(&self, views: &[Vec<Frozen>], limit: Option<u64>) -> Result<usize, ChromaError> {
+    pub fn pinned(&self, limit: Option<u64>) -> Result<usize, ChromaError> {
         let allowed = limit.unwrap_or(self.fixed + self.turns + DEFAULT_PINS);
-        if !self.streams && self.bytes(views, views.len()) <= allowed {
-            return Ok(views.len());
+        let views = self.of_views.len();
+        if !self.streams && self.bytes(views) <= allowed {
+            return Ok(views);
         }
         let needed = self.fixed + self.turns;
         if needed > allowed {
@@ -182,8 +200,8 @@ impl Demand {
             return Ok(0);
         }
         let mut left = allowed - needed;
-        let fits = views.iter().take_while(|view| {
-            let rest = left.checked_sub(self.of_view(view));
+        let fits = self.of_views.iter().take_while(|&&bytes| {
+            let rest = left.checked_sub(bytes);
             left = rest.unwrap_or(left);
             rest.is_some()
         });

@@ -3,25 +3,23 @@
 //! adjoint Aᵀ.
 
 use super::{
-    ChromaError, FrozenViews, Targets,
+    ChromaError, Targets,
     correction::Corrections,
+    field::{DrawBuffers, Drawing, FrozenField},
     host_system::HostSystem,
     loss::{ChromaLossWeights, LOSS_BLOCK, LabLossParameters, RgbLossParameters, Space},
-    view_adjoint::{SolveBuffers, ViewAdjoint, ViewLoss},
+    view_adjoint::{SolveBuffers, ViewAdjoint, ViewLoss, sized},
 };
 use crate::{
     gpu::{Buffer, Recorder},
-    raster::{
-        AdjointScratch, COLOR_FIGURES, Canvas, ChromaSums, Field, Load, LossLog,
-        constants::STATUS_WORDS,
-    },
+    raster::{COLOR_FIGURES, ChromaSums, Field, Load, LossLog, constants::STATUS_WORDS},
     splats::ShField,
 };
 
 /// A view and what is wanted there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Task {
-    /// Index into [`FrozenViews`].
+    /// Index into the views of a [`FrozenField`].
     pub view: usize,
     /// Index into [`Targets`].
     pub target: usize,
@@ -52,7 +50,7 @@ pub(super) enum LossOutput {
 
 /// All passes of one solve.
 pub(super) struct Passes<'a> {
-    pub frozen: &'a FrozenViews,
+    pub frozen: &'a dyn FrozenField,
     targets: &'a Targets,
     pub tasks: Vec<Task>,
     /// Harmonics of all Gaussians, or of those that one view shows.
@@ -66,8 +64,9 @@ pub(super) struct Passes<'a> {
     pub log: LossLog,
     pub status: Buffer<u32>,
     pub corrections: Corrections,
-    /// A seat for each scale of each pinned task, then one for each scale that all
-    /// others take turns in.
+    drawing: Box<dyn Drawing + 'a>,
+    /// For each scale of each pinned task, then for each scale those that all others take turns
+    /// in.
     adjoints: Vec<ViewAdjoint>,
     scales: usize,
     kept: usize,
@@ -77,7 +76,7 @@ impl<'a> Passes<'a> {
     /// Passes of `start` over `tasks` at so many scales; its first `planes` planes are
     /// solved for. The log has room for `entries` losses.
     pub fn new(
-        frozen: &'a FrozenViews,
+        frozen: &'a dyn FrozenField,
         targets: &'a Targets,
         mut tasks: Vec<Task>,
         start: &ShField,
@@ -85,13 +84,12 @@ impl<'a> Passes<'a> {
         space: Space,
         [scales, entries]: [usize; 2],
     ) -> Result<Self, ChromaError> {
-        let raster = &frozen.raster;
-        let gpu = &raster.gpu;
+        let (gpu, kernels) = (frozen.gpu(), frozen.kernels());
         if tasks.is_empty() {
             return Err(ChromaError::NoViews);
         }
         for task in &tasks {
-            let (found, expected) = (targets.size(task.target), frozen.uniform(task.view, 0).size);
+            let (found, expected) = (targets.size(task.target), frozen.size(task.view, 0));
             if found != expected {
                 return Err(ChromaError::WrongSize { found, expected });
             }
@@ -100,13 +98,13 @@ impl<'a> Passes<'a> {
         tasks.sort_by_key(|task| task.view);
         let kept = tasks
             .iter()
-            .filter(|task| frozen.is_pinned(task.view))
+            .filter(|task| task.view < frozen.pinned())
             .count();
-        let splats = frozen.geometry.count;
+        let splats = frozen.on_device();
         let pixels: Vec<usize> = (0..scales)
             .map(|scale| {
-                let views = tasks.iter().map(|task| frozen.uniform(task.view, scale));
-                views.map(|view| view.pixel_count()).max().unwrap_or(0)
+                let pixels = tasks.iter().map(|task| frozen.pixels(task.view, scale));
+                pixels.max().unwrap_or(0)
             })
             .collect();
         let on_device = ShField::zeros(splats, start.degree, start.channels);
@@ -119,28 +117,32 @@ impl<'a> Passes<'a> {
         // Frozen lists never overflow: this status stays zero.
         let status = Buffer::zeros(gpu, "status", STATUS_WORDS)?;
         let blocks = pixels[0].div_ceil(LOSS_BLOCK);
-        let log = LossLog::new(gpu, &frozen.kernels.sum_loss, &status, blocks, entries)?;
-        let corrections = Corrections::new(gpu, &frozen.kernels.correction, tasks.len())?;
-        let canvases = (pixels.iter())
-            .map(|&pixels| Canvas::new(gpu, field.kind, splats, pixels))
-            .collect::<Result<Vec<_>, _>>()?;
-        let capacity = frozen.capacity(tasks.iter().map(|task| task.view));
-        let scratch = AdjointScratch::color(gpu, splats, capacity)?;
+        let log = LossLog::new(gpu, &kernels.sum_loss, &status, blocks, entries)?;
+        let corrections = Corrections::new(gpu, &kernels.correction, tasks.len())?;
+        let image = |pixels| Buffer::zeros(gpu, "image", field.kind.stride() * pixels);
+        let images = (pixels.iter().copied().map(image)).collect::<Result<Vec<_>, _>>()?;
         let image_gradient = Buffer::zeros(gpu, "image gradient", COLOR_FIGURES * pixels[0])?;
+        let views: Vec<usize> = tasks.iter().map(|task| task.view).collect();
+        let sums = ChromaSums {
+            gradient: &gradient,
+            diagonal: &diagonal,
+        };
+        let buffers = DrawBuffers {
+            field: &field,
+            images: &images,
+            adjoint: Some((&image_gradient, sums)),
+        };
+        let drawing = frozen.bind(&views, &buffers)?;
         let weighted = targets.weighted();
         let shared = SolveBuffers {
-            frozen,
-            field: &field,
-            sums: ChromaSums {
-                gradient: &gradient,
-                diagonal: &diagonal,
-            },
+            gpu,
+            kernels,
+            kind: field.kind,
             block_losses: &log.block_losses,
             corrections: &corrections,
             space,
             image_gradient: &image_gradient,
-            scratch: &scratch,
-            canvases: &canvases,
+            images: &images,
         };
         let mut adjoints = Vec::new();
         for &Task { view, target } in &tasks[..kept] {
@@ -149,7 +151,13 @@ impl<'a> Passes<'a> {
                 let wanted = Buffer::from_slice(gpu, "wanted", &target.pixels)?;
                 let weights = target.weights.as_deref().unwrap_or(&[0.0]);
                 let weights = Buffer::from_slice(gpu, "pixel weights", weights)?;
-                adjoints.push(ViewAdjoint::new(&shared, view, scale, wanted, weights)?);
+                adjoints.push(ViewAdjoint::new(
+                    &shared,
+                    frozen.size(view, scale),
+                    scale,
+                    wanted,
+                    weights,
+                )?);
             }
             // What is written waits on the host until it is there.
             gpu.queue().submit([]);
@@ -161,7 +169,13 @@ impl<'a> Passes<'a> {
             let weights: Buffer<f32> = Buffer::zeros(gpu, "pixel weights", count)?;
             for scale in 0..scales {
                 let (wanted, weights) = (wanted.clone(), weights.clone());
-                adjoints.push(ViewAdjoint::new(&shared, view, scale, wanted, weights)?);
+                adjoints.push(ViewAdjoint::new(
+                    &shared,
+                    frozen.size(view, scale),
+                    scale,
+                    wanted,
+                    weights,
+                )?);
             }
         }
         Ok(Self {
@@ -175,6 +189,7 @@ impl<'a> Passes<'a> {
             log,
             status,
             corrections,
+            drawing,
             adjoints,
             scales,
             kept,
@@ -183,14 +198,13 @@ impl<'a> Passes<'a> {
 
     /// Work of a dispatch, the mean over the tasks at so many scales.
     pub fn load(&self, scales: usize) -> Load {
-        let views = self.tasks.iter().map(|task| task.view);
+        let views: Vec<usize> = self.tasks.iter().map(|task| task.view).collect();
         let channels = self.field.kind.channels() as f64;
-        let on_device = self.frozen.geometry.count as f64;
-        let of_splat = self.field.planes.len() as f64 / on_device;
+        let of_splat = self.field.planes.len() as f64 / self.frozen.on_device() as f64;
         Load {
             channels,
             sh_planes: of_splat,
-            ..self.frozen.load(views, scales)
+            ..self.frozen.load(&views, scales)
         }
     }
 
@@ -200,7 +214,7 @@ impl<'a> Passes<'a> {
         if let Some(on_host) = self.on_host.as_mut().filter(|_| sums) {
             on_host.clear();
         }
-        let mut recorder = Recorder::new(&self.frozen.raster.gpu);
+        let mut recorder = Recorder::new(self.frozen.gpu());
         recorder.clear(self.log.losses.raw());
         if sums {
             recorder.clear(self.gradient.raw());
@@ -278,8 +292,8 @@ impl<'a> Passes<'a> {
         entry: usize,
         ending: LossOutput,
     ) -> Result<(), ChromaError> {
-        let (frozen, raster) = (self.frozen, &self.frozen.raster);
-        let gpu = &raster.gpu;
+        let frozen = self.frozen;
+        let (gpu, kernels) = (frozen.gpu(), frozen.kernels());
         let Task { view, target } = self.tasks[index];
         let stays = index < self.kept;
         let view_adjoint =
@@ -295,18 +309,17 @@ impl<'a> Passes<'a> {
             if let Some(weights) = &target.weights {
                 view_adjoint.weights.write(gpu, weights);
             }
+            (view_adjoint.view).write(gpu, &[sized(frozen.size(view, scale))]);
             target.weights.is_some()
         };
-        let pixels = frozen.uniform(view, scale).pixel_count();
+        let pixels = frozen.pixels(view, scale);
         let blocks = pixels.div_ceil(LOSS_BLOCK) as u32;
         let mut recorder = Recorder::new(gpu);
-        frozen.list(view, scale, self.field.degree, &mut recorder);
-        view_adjoint.layer.record(raster, &mut recorder);
-        let kernels = &frozen.kernels;
+        self.drawing.draw(view, scale, &mut recorder)?;
         let agreement = loss_settings.agreement;
         let agreeing = view_adjoint.agreeing.as_ref().filter(|_| agreement > 0.0);
         let coarser = scale + usize::from(agreeing.is_some());
-        let coarser_size = frozen.uniform(view, coarser).size;
+        let coarser_size = frozen.size(view, coarser);
         let told = u32::from(weighted);
         let [plain, with_agreement] = match &view_adjoint.view_loss {
             ViewLoss::Rgb(parameters) => {
@@ -347,11 +360,10 @@ impl<'a> Passes<'a> {
             self.corrections.choose(gpu, parameters, index, weighted);
             (self.corrections).sum(&kernels.correction, sums, &mut recorder);
         }
-        let sum_loss = &frozen.kernels.sum_loss;
         self.log
-            .record(gpu, sum_loss, &mut recorder, blocks, pixels, entry);
+            .record(gpu, &kernels.sum_loss, &mut recorder, blocks, pixels, entry);
         if ending != LossOutput::Loss {
-            view_adjoint.adjoint.record(raster, &mut recorder);
+            self.drawing.adjoint(view, scale, &mut recorder)?;
         }
         recorder.submit();
         Ok(())

@@ -8,9 +8,10 @@ use std::{
 };
 
 use super::{
-    ChromaError, ChromaSettings, Correction, FrozenViews, IrlsSolver, MemoryBudget, Supervision,
-    Targets, Task, fill_unseen,
-    frozen::Colors,
+    ChromaError, ChromaSettings, Correction, FrozenField, FrozenViews, IrlsSolver, MemoryBudget,
+    Supervision, Targets, Task,
+    field::Colors,
+    fill_unseen,
     strokes::{Claims, StrokeWeights, laid_over, shaded_at, whole_or_none},
     teacher::HintImage,
 };
@@ -47,7 +48,7 @@ pub struct Repainter<'a> {
     /// All views of the dataset, in its order, of so many pixels at most.
     frozen: FrozenViews,
     cameras: Vec<Camera>,
-    claims: Claims<'a>,
+    claims: Claims,
     /// Claims that `chroma` knows.
     weights: StrokeWeights,
     /// Views with strokes.
@@ -96,12 +97,13 @@ impl<'a> Repainter<'a> {
             streams: true,
         };
         let views = dataset.cameras.len();
-        let claims = Claims::new(luma);
+        let frozen = FrozenViews::new(raster, luma, dataset.extent, &cameras, 1, room)?;
+        let claims = Claims::new(frozen.primitives());
         let cold = chroma.is_none();
         let gray = || ShField::zeros(luma.len(), settings.sh_degree, 2);
         let chroma = chroma.unwrap_or_else(gray);
         Ok(Self {
-            frozen: FrozenViews::new(raster, luma, dataset.extent, &cameras, 1, room)?,
+            frozen,
             cameras,
             weights: claims.weights(),
             claims,
@@ -240,7 +242,7 @@ impl<'a> Repainter<'a> {
             rounds += done;
             self.shown = self.chroma.clone();
             if self.settings.fill && whole {
-                fill_unseen(self.luma, &mut self.shown, &seen);
+                fill_unseen(self.frozen.primitives(), &mut self.shown, &seen);
             }
             settles(&self.shown);
         }
@@ -400,14 +402,14 @@ impl<'a> Repainter<'a> {
             ab.copy_from_slice(&TINT.map(|value| one * doubt * value));
         }
         let mut found = Vec::new();
-        for _ in 0..places.min(self.frozen.len()) {
+        for _ in 0..places.min(self.frozen.views()) {
             let mut field = ShField::zeros(doubts.len(), 0, 2);
             for (ab, doubt) in field.coefficients.chunks_exact_mut(2).zip(&doubts) {
                 ab[0] = one * doubt;
             }
             let field = self.frozen.colors(&field)?;
             let mut most = (0.0, None);
-            for view in 0..self.frozen.len() {
+            for view in 0..self.frozen.views() {
                 let drawn = self.frozen.draw(view, &[&field])?;
                 let doubt: f32 = drawn[0].pixels.iter().sum();
                 if doubt > most.0 {
@@ -418,7 +420,7 @@ impl<'a> Repainter<'a> {
                 break;
             };
             found.push((best, place));
-            let pixels = self.frozen.uniform(best, 0).pixel_count();
+            let pixels = self.frozen.pixels(best, 0);
             let shown = self
                 .frozen
                 .gather(best, &vec![[1.0, 0.0, 0.0, 0.0]; pixels])?;

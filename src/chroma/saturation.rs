@@ -8,7 +8,7 @@
 
 use std::ops::ControlFlow;
 
-use super::{ChromaError, FrozenViews, Targets, Task};
+use super::{ChromaError, Targets, Task, field::FrozenField};
 use crate::splats::{ShField, sh};
 
 /// Views that are looked at, at most: the factor is one number.
@@ -30,7 +30,7 @@ const STEADY: f64 = 0.9;
 /// # Errors
 /// [`ChromaError::Gpu`], [`ChromaError::Spill`], [`ChromaError::Cancelled`].
 pub fn match_saturation(
-    frozen: &FrozenViews,
+    frozen: &dyn FrozenField,
     targets: &Targets,
     tasks: &[Task],
     agreed: f64,
@@ -38,7 +38,7 @@ pub fn match_saturation(
     observe: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<f64, ChromaError> {
     let colors = frozen.colors(chroma)?;
-    let mut whole = ShField::zeros(frozen.splat_count(), 0, 2);
+    let mut whole = ShField::zeros(frozen.primitives().count(), 0, 2);
     whole.coefficients.fill((1.0 / sh::C0) as f32);
     let opacity = frozen.colors(&whole)?;
     let (mut wanted, mut shown) = (0.0, 0.0);

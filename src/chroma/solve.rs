@@ -1,15 +1,12 @@
 //! Stage 2 as a whole: one of the solvers, and color for what no view shows.
 
 use super::{
-    AdamSolver, ChromaError, ChromaObserver, ChromaSettings, Correction, FrozenViews, IrlsSolver,
+    AdamSolver, ChromaError, ChromaObserver, ChromaSettings, Correction, FrozenField, IrlsSolver,
     SolverKind, Targets, Task,
     checkpoint::{Interruptible, SolverState},
     fill_unseen,
 };
-use crate::{
-    raster::Load,
-    splats::{ShField, Splats},
-};
+use crate::{raster::Load, splats::ShField};
 
 /// Result of a distillation.
 pub struct Solved {
@@ -34,18 +31,16 @@ pub fn unseen_share(seen: &[f32]) -> f64 {
     unseen as f64 / seen.len().max(1) as f64
 }
 
-/// Distills the wanted a/b of `tasks` into chroma harmonics of the frozen geometry, that of
-/// `luma`.
+/// Distills the wanted a/b of `tasks` into chroma harmonics of the frozen geometry.
 ///
 /// # Errors
 /// [`ChromaError::NoViews`] without tasks, [`ChromaError::WrongSize`] when a target has
 /// not its camera's size, [`ChromaError::Gpu`], [`ChromaError::Spill`].
 pub fn solve(
-    frozen: &FrozenViews,
+    frozen: &dyn FrozenField,
     settings: &ChromaSettings,
     targets: &Targets,
     tasks: Vec<Task>,
-    luma: &Splats,
     observe: &mut ChromaObserver<'_>,
 ) -> Result<Solved, ChromaError> {
     solve_from(
@@ -54,7 +49,6 @@ pub fn solve(
         settings,
         targets,
         tasks,
-        luma,
         observe,
     )
 }
@@ -68,11 +62,10 @@ pub(super) type Between<'a> = (
 /// [`solve`] that can be interrupted and go on.
 pub(super) fn solve_from(
     between: Between<'_>,
-    frozen: &FrozenViews,
+    frozen: &dyn FrozenField,
     settings: &ChromaSettings,
     targets: &Targets,
     tasks: Vec<Task>,
-    luma: &Splats,
     observe: &mut ChromaObserver<'_>,
 ) -> Result<Solved, ChromaError> {
     match settings.solver {
@@ -92,7 +85,7 @@ pub(super) fn solve_from(
             let mut chroma = solver.chroma()?;
             let seen = solver.seen()?;
             if settings.fill {
-                fill_unseen(luma, &mut chroma, &seen);
+                fill_unseen(frozen.primitives(), &mut chroma, &seen);
             }
             Ok(Solved {
                 chroma,

@@ -63,13 +63,13 @@ impl Steps {
                 floors: Buffer::from_slice(gpu, "floors", &vec![UNBOUNDED; passes.gradient.len()])?,
                 losses: passes.log.losses.clone(),
             };
-            let size = [passes.frozen.splat_count(), channels];
+            let size = [passes.frozen.primitives().count(), channels];
             let priors = [priors.ridge, priors.anchor].map(|prior| prior as f32);
             let lbfgs = Lbfgs::new(gpu, kernels, &system, size, priors)?;
             return Ok(Self::Device(system, Box::new(lbfgs)));
         };
         let length = on_host.gradient.len();
-        let splats = passes.frozen.splat_count();
+        let splats = passes.frozen.primitives().count();
         let constants = channels * splats;
         let unknowns = widened(&on_host.unknowns[..length]);
         Ok(Self::Host(Box::new(HostSteps {

@@ -1,13 +1,13 @@
-//! Buffers and bindings by which a view is drawn and judged in a pass.
+//! Buffers and bindings by which a view's picture is judged in a pass.
 
 use super::{
-    ChromaError, FrozenViews,
+    ChromaError, ChromaKernels,
     correction::{CorrectionParameters, Corrections},
     loss::{ChromaLossWeights, LabLossParameters, RgbLossParameters, Space},
 };
 use crate::{
-    gpu::{Bindings, Buffer, Kernel},
-    raster::{AdjointScratch, Canvas, ChromaAdjoint, ChromaSums, ColorKind, Field, Layer},
+    gpu::{Bindings, Buffer, Gpu, Kernel},
+    raster::{ColorKind, ViewUniform},
 };
 
 /// Parameters of a view's loss.
@@ -21,24 +21,23 @@ pub(super) enum ViewLoss {
     Lab(Buffer<LabLossParameters>),
 }
 
-/// Buffers that all seats of a solve share.
+/// Buffers that all views of a solve share.
 pub(super) struct SolveBuffers<'a> {
-    pub frozen: &'a FrozenViews,
-    pub field: &'a Field,
-    pub sums: ChromaSums<'a>,
+    pub gpu: &'a Gpu,
+    pub kernels: &'a ChromaKernels,
+    pub kind: ColorKind,
     pub block_losses: &'a Buffer<f32>,
     pub corrections: &'a Corrections,
     pub space: Space,
     pub image_gradient: &'a Buffer<f32>,
-    pub scratch: &'a AdjointScratch,
     /// One for each scale.
-    pub canvases: &'a [Canvas],
+    pub images: &'a [Buffer<f32>],
 }
 
-/// Buffers and bindings by which one view at one scale is drawn and judged.
+/// Buffers and bindings by which the picture of one view at one scale is judged.
 pub(super) struct ViewAdjoint {
-    pub layer: Layer,
-    pub adjoint: ChromaAdjoint,
+    /// Its size; kernels of the loss need no more of a camera.
+    pub view: Buffer<ViewUniform>,
     pub view_loss: ViewLoss,
     pub loss: Bindings,
     /// The loss with the agreement with a coarser scale, where there is one.
@@ -48,42 +47,30 @@ pub(super) struct ViewAdjoint {
 }
 
 impl ViewAdjoint {
-    /// Those of a view at a scale.
+    /// Those of a view of this size at a scale.
     pub fn new(
         shared: &SolveBuffers<'_>,
-        view: usize,
+        size: [u32; 2],
         scale: usize,
         wanted: Buffer<u32>,
         weights: Buffer<f32>,
     ) -> Result<Self, ChromaError> {
         let &SolveBuffers {
-            frozen,
-            field,
+            gpu,
+            kernels,
             corrections,
             image_gradient,
+            images,
             ..
         } = shared;
-        let (raster, geometry, kernels) = (&frozen.raster, &frozen.geometry, &frozen.kernels);
-        let gpu = &raster.gpu;
-        let lists = frozen.lists(view, scale).ok_or(ChromaError::NoViews)?;
-        let (canvas, tiles) = (shared.canvases[scale].clone(), lists.max_tiles());
-        let layer = Layer::on(raster, geometry, lists, field, canvas, tiles);
-        let scratch = shared.scratch.clone();
-        let adjoint = ChromaAdjoint::new(
-            raster,
-            geometry,
-            lists,
-            &layer,
-            image_gradient,
-            scratch,
-            shared.sums,
-        );
+        let image = &images[scale];
+        let view = Buffer::uniform(gpu, "size of a view", &sized(size))?;
         // The first bindings are the same for all losses; the coarser picture is the last.
         let tied =
             |parameters: &wgpu::Buffer, more: &[&wgpu::Buffer], [plain, agreeing]: [_; 2]| {
                 let mut buffers = vec![
-                    lists.view.raw(),
-                    layer.image.raw(),
+                    view.raw(),
+                    image.raw(),
                     wanted.raw(),
                     parameters,
                     shared.block_losses.raw(),
@@ -92,13 +79,13 @@ impl ViewAdjoint {
                 ];
                 buffers.extend(more);
                 let loss = Kernel::bind(plain, gpu, &buffers);
-                let agreeing = shared.canvases.get(scale + 1).map(|coarser| {
-                    buffers.push(coarser.image().raw());
+                let agreeing = images.get(scale + 1).map(|coarser| {
+                    buffers.push(coarser.raw());
                     Kernel::bind(agreeing, gpu, &buffers)
                 });
                 (loss, agreeing)
             };
-        let (view_loss, (loss, agreeing)) = match field.kind {
+        let (view_loss, (loss, agreeing)) = match shared.kind {
             ColorKind::Rgb if shared.space == Space::Lab => {
                 let parameters = LabLossParameters::default();
                 let parameters = Buffer::uniform(gpu, "lab loss parameters", &parameters)?;
@@ -120,7 +107,7 @@ impl ViewAdjoint {
                 let found = corrections.corrections.raw();
                 let tied = tied(of_loss.raw(), &[found], both);
                 let parameters = corrections.parameters(gpu, 0, false)?;
-                let inputs = [lists.view.raw(), layer.image.raw(), wanted.raw()];
+                let inputs = [view.raw(), image.raw(), wanted.raw()];
                 let inputs = (inputs, image_gradient, &weights);
                 let sums = corrections.bind(gpu, &kernels.correction, &parameters, inputs);
                 let view_loss = ViewLoss::Chroma {
@@ -132,13 +119,20 @@ impl ViewAdjoint {
             }
         };
         Ok(Self {
-            layer,
-            adjoint,
+            view,
             view_loss,
             loss,
             agreeing,
             wanted,
             weights,
         })
+    }
+}
+
+/// A view of which nothing counts but the size.
+pub(super) fn sized(size: [u32; 2]) -> ViewUniform {
+    ViewUniform {
+        size,
+        ..ViewUniform::default()
     }
 }

@@ -23,27 +23,22 @@ impl Canvas {
         4 * (stride * splats as u64 + (stride + 1) * max_pixels as u64)
     }
 
-    /// A canvas for so many Gaussians and pixels.
+    /// A canvas for so many Gaussians and a picture, `[pixels]` of the kind's stride.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
-    pub fn new(
+    pub fn of(
         gpu: &Gpu,
         kind: ColorKind,
         splats: usize,
-        max_pixels: usize,
+        image: &Buffer<f32>,
     ) -> Result<Self, GpuError> {
         let stride = kind.stride();
         Ok(Self {
             colors: Buffer::zeros(gpu, "colors", splats * stride)?,
-            image: Buffer::zeros(gpu, "image", max_pixels * stride)?,
-            lasts: Buffer::zeros(gpu, "lasts", max_pixels)?,
+            image: image.clone(),
+            lasts: Buffer::zeros(gpu, "lasts", image.len() / stride)?,
         })
-    }
-
-    /// The picture last drawn, `[pixels]` of the kind's stride.
-    pub fn image(&self) -> &Buffer<f32> {
-        &self.image
     }
 }
 
@@ -76,7 +71,9 @@ impl Layer {
         max_pixels: usize,
         max_tiles: usize,
     ) -> Result<Self, GpuError> {
-        let canvas = Canvas::new(&raster.gpu, field.kind, geometry.count, max_pixels)?;
+        let (gpu, kind) = (&raster.gpu, field.kind);
+        let image = Buffer::zeros(gpu, "image", max_pixels * kind.stride())?;
+        let canvas = Canvas::of(gpu, kind, geometry.count, &image)?;
         Ok(Self::on(raster, geometry, lists, field, canvas, max_tiles))
     }
 

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use super::gaussian::{bake_rgb, darkest};
 use crate::{
     chroma::{
-        ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenViews, IrlsSolver,
+        ChromaError, ChromaObserver, ChromaProgress, ChromaSettings, FrozenField, IrlsSolver,
         Targets, Task, native_rgb,
     },
     splats::{ShField, Splats, sh},
@@ -25,14 +25,14 @@ const BAKE_ROUNDS: usize = 8;
 /// # Errors
 /// As [`solve`](crate::chroma::solve).
 pub fn fit_rgb(
-    frozen: &FrozenViews,
+    frozen: &dyn FrozenField,
     settings: &ChromaSettings,
     targets: &Targets,
     tasks: Vec<Task>,
     observe: &mut ChromaObserver<'_>,
 ) -> Result<ShField, ChromaError> {
     // Mid-gray.
-    let start = ShField::zeros(frozen.splat_count(), settings.sh_degree, 3);
+    let start = ShField::zeros(frozen.primitives().count(), settings.sh_degree, 3);
     let mut solver = IrlsSolver::starting_at(frozen, settings, targets, tasks, &start)?;
     solver.run(observe)?;
     solver.chroma()
@@ -54,7 +54,7 @@ pub(in crate::chroma) enum BakeStep {
 /// # Errors
 /// As [`solve`](crate::chroma::solve).
 pub fn bake(
-    frozen: &FrozenViews,
+    frozen: &dyn FrozenField,
     luma: &Splats,
     chroma: &ShField,
     observe: &mut ChromaObserver<'_>,
@@ -67,7 +67,7 @@ pub fn bake(
 
 /// [`bake`] that tells of what it draws before as well.
 pub(in crate::chroma) fn bake_telling(
-    frozen: &FrozenViews,
+    frozen: &dyn FrozenField,
     luma: &Splats,
     chroma: &ShField,
     observe: &mut dyn FnMut(BakeStep) -> ControlFlow<()>,
@@ -80,7 +80,7 @@ pub(in crate::chroma) fn bake_telling(
     let room = raise_to_black(&mut baked);
     // What is missing is linear in what the Gaussians are moved by: these are Gaussians
     // around mid-gray, of which none is black.
-    let unmoved = ShField::zeros(frozen.splat_count(), 0, 3);
+    let unmoved = ShField::zeros(frozen.primitives().count(), 0, 3);
     let (targets, tasks) = missing(frozen, [&luma.sh, chroma, &baked.sh, &unmoved], observe)?;
     let mut solver = IrlsSolver::starting_at(frozen, &settings, &targets, tasks, &unmoved)?;
     solver.set_floors(&room);
@@ -99,16 +99,16 @@ pub(in crate::chroma) fn bake_telling(
 /// Difference of the native pictures to `exported`, on top of the picture of `unmoved`. Wanted
 /// pictures hold 0 to 1: what lacks more than half of that is asked for in part.
 fn missing(
-    frozen: &FrozenViews,
+    frozen: &dyn FrozenField,
     [luma, chroma, exported, unmoved]: [&ShField; 4],
     observe: &mut dyn FnMut(BakeStep) -> ControlFlow<()>,
 ) -> Result<(Targets, Vec<Task>), ChromaError> {
     let (luma, chroma) = (frozen.colors(luma)?, frozen.colors(chroma)?);
     let (exported, unmoved) = (frozen.colors(exported)?, frozen.colors(unmoved)?);
     let mut targets = Targets::new(1);
-    let step = frozen.len().div_ceil(BAKE_VIEWS).max(1);
-    let total = frozen.len().div_ceil(step);
-    let tasks = (0..frozen.len())
+    let step = frozen.views().div_ceil(BAKE_VIEWS).max(1);
+    let total = frozen.views().div_ceil(step);
+    let tasks = (0..frozen.views())
         .step_by(step)
         .enumerate()
         .map(|(drawn, view)| {

@@ -9,18 +9,18 @@ mod region;
 mod shade;
 mod spread;
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
-    ChromaError, FrozenViews, Supervision, Target, Targets, Task,
-    frozen::Colors,
+    ChromaError, Supervision, Target, Targets, Task,
+    field::{Colors, FrozenField, Primitives},
     teacher::{AbImage, HintImage},
 };
 use crate::{
     capture::{Dataset, Photo},
     color::gray_to_lightness,
     raster::RenderedImage,
-    splats::{ShField, Splats, sh},
+    splats::{ShField, sh},
 };
 use region::{Surface, grow};
 use shade::shaded;
@@ -118,20 +118,20 @@ impl StrokeWeights {
 }
 
 /// Claims of strokes, photo by photo.
-pub(super) struct Claims<'a> {
-    cloud: Cloud<'a>,
+pub(super) struct Claims {
+    cloud: Cloud,
     splats: usize,
     /// Of each painted view of the dataset: its Gaussians, and its pixels' place among the regions.
     of_view: BTreeMap<usize, (Vec<StrokeWeight>, usize)>,
     regions: Targets,
 }
 
-impl<'a> Claims<'a> {
-    /// No claims on the Gaussians of `luma`.
-    pub fn new(luma: &'a Splats) -> Self {
+impl Claims {
+    /// No claims on the Gaussians of a field.
+    pub fn new(primitives: &Arc<Primitives>) -> Self {
         Self {
-            cloud: Cloud::of(luma),
-            splats: luma.len(),
+            cloud: Cloud::of(primitives),
+            splats: primitives.count(),
             of_view: BTreeMap::new(),
             regions: Targets::new(1),
         }
@@ -141,7 +141,7 @@ impl<'a> Claims<'a> {
     /// `photo`, in the place of what was painted there.
     pub fn paint(
         &mut self,
-        frozen: &FrozenViews,
+        frozen: &dyn FrozenField,
         [view, index]: [usize; 2],
         photo: &Photo,
         paint: &HintImage,
@@ -199,7 +199,7 @@ impl<'a> Claims<'a> {
     /// lightness, and α.
     pub fn on(
         &self,
-        frozen: &FrozenViews,
+        frozen: &dyn FrozenField,
         [view, index]: [usize; 2],
         fields: &[Colors<'_>; 2],
     ) -> Result<Vec<([f32; 2], f32)>, ChromaError> {
@@ -220,12 +220,11 @@ impl<'a> Claims<'a> {
 /// Lays the strokes of a supervision over what its teachers want, in all views that color learns
 /// from: `frozen` has these and no others, in their order.
 pub(super) fn lay(
-    frozen: &FrozenViews,
+    frozen: &dyn FrozenField,
     dataset: &Dataset,
     supervision: &Supervision,
-    luma: &Splats,
 ) -> Result<StrokeTargets, ChromaError> {
-    let mut claims = Claims::new(luma);
+    let mut claims = Claims::new(frozen.primitives());
     for (index, &view) in supervision.views.iter().enumerate() {
         if let Some(paint) = supervision.paint(view)? {
             let photo = dataset.photo(view)?;

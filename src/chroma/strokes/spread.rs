@@ -1,9 +1,12 @@
 //! From what a photo's strokes claim of the Gaussians that it shows to those that it does not.
 
-use std::collections::BinaryHeap;
+use std::{collections::BinaryHeap, sync::Arc};
 
 use super::region::{Front, claimed};
-use crate::splats::{Splats, nearest_neighbors, sh};
+use crate::{
+    chroma::field::Primitives,
+    splats::{nearest_neighbors, sh},
+};
 
 /// Neighbors that a front runs to.
 const NEIGHBORS: usize = 8;
@@ -36,16 +39,16 @@ pub(super) struct StrokeWeight {
 }
 
 /// Neighborhood and gray of the Gaussians.
-pub(super) struct Cloud<'a> {
-    means: &'a [[f32; 3]],
+pub(super) struct Cloud {
+    primitives: Arc<Primitives>,
     grays: Vec<f32>,
     neighbors: Vec<Vec<u32>>,
 }
 
-impl<'a> Cloud<'a> {
+impl Cloud {
     /// The cloud of a scene of one channel.
-    pub fn of(luma: &'a Splats) -> Self {
-        let nearest = nearest_neighbors(&luma.means, NEIGHBORS);
+    pub fn of(primitives: &Arc<Primitives>) -> Self {
+        let nearest = nearest_neighbors(&primitives.centers, NEIGHBORS);
         let mut neighbors = nearest.clone();
         // A front runs both ways.
         for (i, others) in (0..).zip(&nearest) {
@@ -58,10 +61,10 @@ impl<'a> Cloud<'a> {
             others.dedup();
         }
         Self {
-            grays: (0..luma.len())
-                .map(|i| 0.5 + sh::C0 as f32 * luma.sh.of(i)[0])
+            grays: (primitives.luma.iter())
+                .map(|&luma| 0.5 + sh::C0 as f32 * luma)
                 .collect(),
-            means: &luma.means,
+            primitives: primitives.clone(),
             neighbors,
         }
     }
@@ -119,18 +122,21 @@ impl<'a> Cloud<'a> {
     fn step(&self, from: usize, to: usize, reach: f32) -> f32 {
         let apart = (self.grays[from] - self.grays[to]).abs();
         let edge = ((apart - GRAY[0]) / (GRAY[1] - GRAY[0])).max(0.0);
-        let far = distance(self.means[from], self.means[to]);
+        let far = distance(self.primitives.centers[from], self.primitives.centers[to]);
         far / reach + edge
     }
 
     /// Distance of most of some Gaussians from their middle.
     fn size(&self, some: &[usize]) -> f32 {
         let middle = [0, 1, 2].map(|axis| {
-            let mut values: Vec<f32> = some.iter().map(|&i| self.means[i][axis]).collect();
+            let mut values: Vec<f32> = some
+                .iter()
+                .map(|&i| self.primitives.centers[i][axis])
+                .collect();
             quantile(&mut values, 0.5)
         });
         let mut far: Vec<f32> = (some.iter())
-            .map(|&i| distance(self.means[i], middle))
+            .map(|&i| distance(self.primitives.centers[i], middle))
             .collect();
         quantile(&mut far, INSIDE)
     }

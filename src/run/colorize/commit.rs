@@ -41,7 +41,7 @@ impl Coloring<'_> {
         }
         let [color, chroma] = [folder.color(), folder.chroma()].map(|path| commit.place(&path));
         write_scene(&color)?;
-        files::write(&chroma, &npy::encode(&solved.colored.chroma))?;
+        files::write(&chroma, &npy::encode(&solved.colored.distilled.chroma))?;
         let mut known = report.files.iter();
         let luma = known.find(|file| folder.luma().ends_with(&file.name));
         let luma = luma.cloned().map_or_else(|| of_file(&folder.luma()), Ok)?;

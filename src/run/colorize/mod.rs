@@ -121,7 +121,7 @@ impl Coloring<'_> {
         observe: &mut Observer<'_>,
     ) -> Result<Measured, RunError> {
         let supervision = &supervised.taught.supervision;
-        let views = [colored.colored_views, supervision.views.len()];
+        let views = [colored.distilled.colored_views, supervision.views.len()];
         if let Some(warning) = few_colors(self.unseen(colored), views) {
             observe(Event::Warning(warning));
         }
@@ -130,7 +130,10 @@ impl Coloring<'_> {
             &self.dataset,
             &exposures(&self.dataset, &self.trained.exposures),
             [&self.luma, &colored.splats],
-            (&colored.chroma, colored.splats_at_a_time.is_some()),
+            (
+                &colored.distilled.chroma,
+                colored.splats_at_a_time.is_some(),
+            ),
             supervision,
             &mut |progress| observe(progress.into()),
         );
@@ -141,7 +144,7 @@ impl Coloring<'_> {
     fn unseen(&self, colored: &Colored) -> Option<f64> {
         // Surroundings are what no photo shows.
         let scene = self.luma.len().saturating_sub(self.trained.surroundings);
-        (colored.seen.as_ref()).map(|seen| unseen_share(&seen[..scene]))
+        (colored.distilled.seen.as_ref()).map(|seen| unseen_share(&seen[..scene]))
     }
 }
 

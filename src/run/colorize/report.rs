@@ -51,7 +51,7 @@ impl Coloring<'_> {
         let (colored, supervision) = (&solved.colored, &supervised.taught.supervision);
         let (teach, split) = (&self.request.teach, &self.dataset.split);
         let [distill, bake] = colored.seconds;
-        let last = colored.last;
+        let last = colored.distilled.last;
         let steps = last.map_or(0, |progress| progress.iteration);
         let painted = supervision.painted_held_out(split);
         let name = |view: usize| self.dataset.capture.views[view].name.clone();
@@ -74,16 +74,16 @@ impl Coloring<'_> {
                 let path = found.as_ref().unwrap_or(folder);
                 path.to_str().map(str::to_owned)
             }),
-            claimed: colored.claimed,
+            claimed: colored.distilled.claimed,
             painted_held_out: painted.into_iter().map(name).collect(),
-            colored_views: colored.colored_views,
+            colored_views: colored.distilled.colored_views,
             unseen: self.unseen(colored),
-            saturation: colored.saturation,
+            saturation: colored.distilled.saturation,
             iterations: steps,
             until: self.trained.iterations + steps,
             passes: last.map_or(0.0, |progress| progress.passes),
             moved: last.and_then(|progress| progress.moved),
-            effects: EffectReport::of(&colored.effects),
+            effects: EffectReport::of(&colored.distilled.effects),
             warnings: Vec::new(),
             loss: last.map_or(0.0, |progress| progress.loss),
             seconds: ChromaSeconds {
@@ -96,7 +96,7 @@ impl Coloring<'_> {
             estimated_device_memory: colored.estimated_device_memory,
             pinned_views: colored.pinned_views,
             splats_at_a_time: colored.splats_at_a_time,
-            settings: colored.settings.clone(),
+            settings: colored.distilled.settings.clone(),
             bake: measured.bake,
             measured_on: supervision.measured(split).0.to_owned(),
             pictures: measured.mean(),

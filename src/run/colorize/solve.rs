@@ -83,22 +83,29 @@ impl Coloring<'_> {
             luma: Some(&self.luma),
         };
         let distill = Distill {
-            raster: &self.raster,
             dataset: &self.dataset,
-            luma: &self.luma,
             supervision: &supervised.taught.supervision,
             sh_degree: request.sh_degree,
             correct_views: request.correct_views,
         };
-        let colored = distill.run_from(checkpoint, &mut showing, settings, &mut |event| {
-            self.tell(event, rounds, journal);
-            ControlFlow::Continue(())
-        });
+        let colored = distill.color_gaussians(
+            (&self.raster, &self.luma),
+            checkpoint,
+            &mut showing,
+            settings,
+            &mut |event| {
+                self.tell(event, rounds, journal);
+                ControlFlow::Continue(())
+            },
+        );
         checkpointing.map_or(Ok(()), CheckpointFiles::close)?;
         let colored = colored?;
         self.show(SceneKind::Color, &colored.splats);
         let timings = match request.timings {
-            true => Some(kernel_reports(&self.gpu.timings()?, &colored.load)),
+            true => Some(kernel_reports(
+                &self.gpu.timings()?,
+                &colored.distilled.load,
+            )),
             false => None,
         };
         Ok(Solved {

@@ -1,6 +1,9 @@
 //! Figures of pixels gathered by the Gaussians: drawing turned around.
 
-use gs_chroma::splats::{ShField, sh};
+use gs_chroma::{
+    chroma::FrozenField,
+    splats::{ShField, sh},
+};
 
 use crate::kernels::wall::{PIXELS, Problem, cameras, chroma_view, drawn, wall};
 

@@ -4,8 +4,8 @@ use std::{ops::ControlFlow, sync::Arc};
 
 use gs_chroma::{
     chroma::{
-        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, MemoryBudget, Targets, Task, bake,
-        solve, teacher::AbImage,
+        ChromaError, ChromaSettings, FrozenField, FrozenViews, IrlsSolver, MemoryBudget, Targets,
+        Task, bake, solve, teacher::AbImage,
     },
     gpu::{Gpu, GpuError},
     luma::{Demand, LumaError, LumaSettings, LumaTrainer, TrainingView, resident_photos},
@@ -210,7 +210,7 @@ fn coloring(
         let start = luma.sh.to_rgb();
         IrlsSolver::starting_at(&frozen, &settings, &targets, tasks, &start)?.run(&mut look)?;
     } else {
-        let solved = solve(&frozen, &settings, &targets, tasks, &luma, &mut look)?;
+        let solved = solve(&frozen, &settings, &targets, tasks, &mut look)?;
         // Rounds of the bake take the same, one after the other.
         let baked = bake(&frozen, &luma, &solved.chroma, &mut |progress| {
             let looked = look(progress);

@@ -18,6 +18,7 @@ mod effects;
 mod gather;
 mod gradient;
 mod harness;
+mod host_field;
 mod layout;
 mod least_squares;
 mod losses;

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use glam::DMat3;
 use gs_chroma::{
     capture::Camera,
-    chroma::{ChromaError, ChromaSettings, bake, match_saturation, solve},
+    chroma::{ChromaError, ChromaSettings, FrozenField, bake, match_saturation, solve},
     splats::{ShField, Splats},
 };
 
@@ -44,7 +44,7 @@ fn results_do_not_depend_on_the_budget() {
             ChromaSettings::adam(12),
         ] {
             let (tasks, quiet) = (problem.tasks.clone(), &mut |_| ControlFlow::Continue(()));
-            let solved = solve(frozen, &settings, targets, tasks, &luma, quiet).unwrap();
+            let solved = solve(frozen, &settings, targets, tasks, quiet).unwrap();
             found.extend(bits(&solved.chroma.coefficients));
             if settings.sh_degree == 0 {
                 let baked = bake(frozen, &luma, &solved.chroma, &mut |_| {
@@ -109,7 +109,7 @@ fn what_no_view_sees_takes_its_neighbors_color() {
         assert_eq!((chroma.of(i), seen[i]), (&[0.0; 2][..], 0.0), "{i}");
     }
     let (frozen, targets, tasks) = (&problem.frozen, &problem.targets, problem.tasks.clone());
-    let filled = solve(frozen, &settings(), targets, tasks, &luma, &mut |_| {
+    let filled = solve(frozen, &settings(), targets, tasks, &mut |_| {
         ControlFlow::Continue(())
     })
     .unwrap();

@@ -6,8 +6,8 @@ use glam::DVec3;
 use gs_chroma::{
     capture::Camera,
     chroma::{
-        ChromaError, ChromaSettings, FrozenViews, IrlsSolver, MemoryBudget, Targets, Task, bake,
-        solve, teacher::AbImage,
+        ChromaError, ChromaSettings, FrozenField, FrozenViews, IrlsSolver, MemoryBudget, Targets,
+        Task, bake, solve, teacher::AbImage,
     },
     gpu::GpuError,
     raster::{
@@ -201,7 +201,7 @@ fn colors_are_those_of_the_whole() {
             let (frozen, targets, tasks) = problem(limit, sh_degree).unwrap();
             let quiet = &mut |_| ControlFlow::Continue(());
             let luma = long_wall();
-            let solved = solve(&frozen, &settings, &targets, tasks, &luma, quiet).unwrap();
+            let solved = solve(&frozen, &settings, &targets, tasks, quiet).unwrap();
             let baked = bake(&frozen, &luma, &solved.chroma, quiet).unwrap();
             (frozen.streamed(), solved, baked)
         };
