@@ -170,7 +170,7 @@ mod tests {
             })
             .collect();
         let mut alphas = vec![0.0; grays.len()];
-        for claim in Cloud::of(&row(grays)).claims(&sums) {
+        for claim in Cloud::of(&Arc::new(Primitives::from(&row(grays)))).claims(&sums) {
             assert_eq!(claim.color, [30.0, 10.0]);
             alphas[claim.splat as usize] = claim.alpha;
         }
