@@ -122,7 +122,8 @@ function put(place, kind, values) {
 function show({ folder, jobs, runs }) {
   at("folder").textContent = folder;
   put(at("jobs"), job, jobs);
-  put(at("runs"), run, runs);
+  const busy = jobs.some(({ makes, phase }) => makes && (phase === "going" || phase === "stopping"));
+  put(at("runs"), run, runs.map((known) => ({ ...known, resumes: known.resumes && !busy })));
 }
 
 async function follow() {
