@@ -6,6 +6,12 @@
 //! `SCENE` is a COLMAP folder with `images/`, `TEACHER` a network or a folder of colored photos.
 //! `OUT.png` gets, of each held-out view, photo, gray field, teacher and colored field.
 
+#![allow(
+    clippy::unnecessary_cast,
+    clippy::useless_conversion,
+    reason = "a grid's numbers are f64 where its gradient is tested"
+)]
+
 #[cfg(test)]
 mod gradient_tests;
 mod grid;
