@@ -162,9 +162,11 @@ impl PaintSession {
             return Ok(());
         }
         self.change(|state| {
-            if state.dirty.is_empty() {
-                state.unsettled = false;
+            // A stroke that came meanwhile waits.
+            if !state.dirty.is_empty() {
+                return;
             }
+            state.unsettled = false;
             state.phase = match stroked.flatten() {
                 Some(stroked) => Phase::Settled {
                     seconds: stroked.elapsed().as_secs_f64(),
