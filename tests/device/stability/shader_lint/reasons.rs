@@ -23,11 +23,6 @@ pub const REASONS: &[(&str, &str, &str)] = &[
         "of a mean of squares times a positive correction",
     ),
     (
-        "blend",
-        "color[row] / transmittance[row]",
-        "no Gaussian is used that leaves less than TRANSMITTANCE_MIN",
-    ),
-    (
         "chroma_loss",
         "0.5 / f32(pixels)",
         "the kernel runs for images of at least one pixel",
@@ -46,6 +41,11 @@ pub const REASONS: &[(&str, &str, &str)] = &[
         "densify_geometry",
         "inverseSqrt",
         "only visible Gaussians are split; they passed QUAT_NORM_MIN_SQ",
+    ),
+    (
+        "end",
+        "color / pixels.transmittance[row]",
+        "no Gaussian is used that leaves less than TRANSMITTANCE_MIN",
     ),
     (
         "footprint",
