@@ -21,6 +21,9 @@ use crate::{
 pub const RUNS: &str = "runs";
 const EXPORTS: &str = "exports";
 
+/// Bytes of a file that is handed out, at most: it is read whole.
+const MOST_BYTES: u64 = 1 << 30;
+
 /// Height of pictures, in pixels.
 const HEIGHT: u32 = 360;
 
@@ -81,13 +84,17 @@ impl Shelved {
             .or_else(|| middle_picture(&self.path.join("house/images")))
     }
 
-    /// Files that can be taken away.
+    /// Files that can be taken away. A link may lead elsewhere.
     fn files(&self, folder: &Path) -> Vec<PathBuf> {
         let found = entries(&self.path)
             .into_iter()
             .chain(entries(&self.exports(folder)));
         found
-            .filter(|path| path.is_file() && has(path, &FILES))
+            .filter(|path| has(path, &FILES))
+            .filter(|path| {
+                let data = fs::symlink_metadata(path);
+                data.is_ok_and(|data| data.is_file() && data.len() <= MOST_BYTES)
+            })
             .collect()
     }
 

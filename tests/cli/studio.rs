@@ -139,6 +139,12 @@ fn a_job_is_started_stopped_and_resumed_and_its_results_are_handed_out() {
 fn nobody_else_starts_anything_and_no_path_leads_out() {
     let place = place_with_run();
     place.write("secret.ply", "not to be seen");
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(
+        place.path("secret.ply"),
+        place.path("runs/scene/linked.ply"),
+    )
+    .expect("a link");
     let desk = Desk::of(&place);
     let own = format!("127.0.0.1:{}", desk.page.port);
     let origin = format!("http://{own}");
@@ -162,6 +168,9 @@ fn nobody_else_starts_anything_and_no_path_leads_out() {
     let news = desk.once(|_| true);
     assert_eq!(news["jobs"], json!([]));
     let id = news["runs"][0]["id"].as_str().expect("a run").to_owned();
+    let files = news["runs"][0]["files"].as_array().expect("files");
+    assert!(files.iter().any(|file| file["name"] == "luma.ply"));
+    assert!(files.iter().all(|file| file["name"] != "linked.ply"));
     for path in [
         "/file/../0",
         "/file/..%2f..%2fsecret/0",
