@@ -1,7 +1,13 @@
 //! Color consistency of pictures of one place: along a rendered path, and between the photographed
 //! views.
 
-use std::{collections::VecDeque, path::Path};
+use std::{
+    collections::VecDeque,
+    panic::resume_unwind,
+    path::Path,
+    sync::mpsc::{Receiver, sync_channel},
+    thread,
+};
 
 use super::{
     ColoredScene, Drawing, EvalError, Layer, Observer, Painter, Progress, Task, mean_pictures,
@@ -12,7 +18,7 @@ use crate::{
     chroma::teacher::AbImage,
     input,
     measure::{Consistency, Flow, decode_flo, visible},
-    report::{BetweenScore, ConsistencyScore, Method, PathConsistency, PathScore},
+    report::{BetweenScore, ConsistencyScore, Method, PathConsistency, PathScore, PictureScore},
     trajectory::camera_path,
 };
 
@@ -116,6 +122,73 @@ impl Sums {
     }
 }
 
+/// Measures of a path's frames so far.
+struct PathSums {
+    /// By distance in frames.
+    sums: Vec<(usize, Sums)>,
+    pictures: Vec<PictureScore>,
+    /// The last frames, the most recent one at the end.
+    recent: VecDeque<Frame>,
+}
+
+impl PathSums {
+    /// Measures frames and their depths as they come.
+    fn of(
+        frames: Receiver<(Drawing, Vec<f32>)>,
+        flow_files: Option<&Path>,
+    ) -> Result<Self, EvalError> {
+        let mut measured = Self {
+            sums: DELTAS.map(|delta| (delta, Sums::default())).into(),
+            pictures: Vec::new(),
+            recent: VecDeque::new(),
+        };
+        for (index, (drawing, depth)) in frames.into_iter().enumerate() {
+            let (scores, colors): (Vec<PictureScore>, _) = drawing.scores().into_iter().unzip();
+            measured.pictures.extend(scores);
+            let camera = drawing.camera;
+            measured.add(
+                index,
+                Frame {
+                    camera,
+                    depth,
+                    colors,
+                },
+                flow_files,
+            )?;
+        }
+        Ok(measured)
+    }
+
+    /// Compares a frame with those before it.
+    fn add(
+        &mut self,
+        index: usize,
+        frame: Frame,
+        flow_files: Option<&Path>,
+    ) -> Result<(), EvalError> {
+        let recent = &self.recent;
+        // The most recent frame is one back.
+        let deltas: Vec<usize> = DELTAS.into_iter().filter(|&d| d <= recent.len()).collect();
+        let compared = |delta: &usize| {
+            let first = &recent[recent.len() - delta];
+            first.compared_with(&frame, [index - delta, index], flow_files)
+        };
+        in_order(&deltas, compared, |delta, compared| {
+            let (forward, seen) = compared?;
+            let first = &recent[recent.len() - delta];
+            for (_, sums) in self.sums.iter_mut().filter(|(d, _)| d == delta) {
+                sums.add(first, &frame, &forward, &seen);
+            }
+            Ok::<_, EvalError>(())
+        })?;
+        self.recent.push_back(frame);
+        if self.recent.len() > DELTAS[DELTAS.len() - 1] {
+            self.recent.pop_front();
+        }
+        Ok(())
+    }
+}
+
 /// Cameras of a path of so many frames through the training views.
 pub fn path_of(scene: &ColoredScene, frames: usize) -> Vec<Camera> {
     let dataset = &scene.dataset;
@@ -138,43 +211,29 @@ pub fn along_path<E: From<EvalError>>(
     observe: &mut Observer<'_>,
     keep: &mut dyn FnMut(usize, &Drawing) -> Result<(), E>,
 ) -> Result<PathScore, E> {
-    let mut sums: Vec<(usize, Sums)> = DELTAS.map(|delta| (delta, Sums::default())).into();
-    let mut recent: VecDeque<Frame> = VecDeque::new();
-    let mut pictures = Vec::new();
-    for (index, camera) in path.iter().enumerate() {
-        observe(Progress {
-            task: Task::Path,
-            done: index,
-            total: path.len(),
-            name: "",
-        });
-        let drawing = painter.draw_frame(camera, index)?;
-        keep(index, &drawing)?;
-        pictures.extend(drawing.scores());
-        let frame = Frame::of(drawing, painter.depth(camera)?);
-        // The most recent frame is one back.
-        let deltas: Vec<usize> = DELTAS.into_iter().filter(|&d| d <= recent.len()).collect();
-        let compared = |delta: &usize| {
-            let first = &recent[recent.len() - delta];
-            first.compared_with(&frame, [index - delta, index], flow_files)
-        };
-        in_order(
-            &deltas,
-            compared,
-            |delta, compared: Result<_, EvalError>| {
-                let (forward, seen) = compared?;
-                let first = &recent[recent.len() - delta];
-                for (_, sums) in sums.iter_mut().filter(|(d, _)| d == delta) {
-                    sums.add(first, &frame, &forward, &seen);
-                }
-                Ok::<_, EvalError>(())
-            },
-        )?;
-        recent.push_back(frame);
-        if recent.len() > DELTAS[DELTAS.len() - 1] {
-            recent.pop_front();
+    // Frames are measured while the device draws the next one.
+    let (sender, receiver) = sync_channel(1);
+    let measured = thread::scope(|scope| {
+        let measuring = scope.spawn(|| PathSums::of(receiver, flow_files));
+        for (index, camera) in path.iter().enumerate() {
+            observe(Progress {
+                task: Task::Path,
+                done: index,
+                total: path.len(),
+                name: "",
+            });
+            let drawing = painter.draw_frame(camera, index)?;
+            let depth = painter.depth(camera)?;
+            keep(index, &drawing)?;
+            if sender.send((drawing, depth)).is_err() {
+                // It has failed, and says why.
+                break;
+            }
         }
-    }
+        drop(sender);
+        let ended = measuring.join();
+        Ok::<_, E>(ended.unwrap_or_else(|panic| resume_unwind(panic))?)
+    })?;
     let skipped: Vec<usize> = DELTAS.into_iter().filter(|&d| d >= path.len()).collect();
     let flow = if flow_files.is_some() {
         "files"
@@ -186,15 +245,14 @@ pub fn along_path<E: From<EvalError>>(
         size: [path[0].width, path[0].height],
         flow: flow.to_owned(),
         skipped,
-        consistency: sums
-            .iter()
+        consistency: (measured.sums.iter())
             .flat_map(|(delta, sums)| {
                 let delta = *delta;
                 let scores = sums.scores().into_iter();
                 scores.map(move |score| PathConsistency { delta, score })
             })
             .collect(),
-        pictures: mean_pictures(pictures.iter()),
+        pictures: mean_pictures(measured.pictures.iter()),
         detections: Vec::new(),
     })
 }

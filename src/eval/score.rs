@@ -61,14 +61,16 @@ impl Drawing {
         [luma].into_iter().chain(layers).collect()
     }
 
-    /// Scores of each method's picture against the gray one in 8 bits.
-    pub fn scores(&self) -> Vec<PictureScore> {
+    /// Scores of each method's picture against the gray one in 8 bits, and its a/b.
+    pub fn scores(&self) -> Vec<(PictureScore, (Method, Vec<[f32; 2]>))> {
         let reference = Reference {
             photo: &as_photo(&self.gray),
             exposure: Exposure::NONE,
         };
         let score = |(method, layer): &(Method, Layer)| {
-            score(reference, method, &layer.rgb(&self.gray), &layer.ab())
+            let ab = layer.ab();
+            let scored = score(reference, method, &layer.rgb(&self.gray), &ab);
+            (scored, (method.clone(), ab))
         };
         self.layers.iter().map(score).collect()
     }

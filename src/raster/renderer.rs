@@ -31,6 +31,8 @@ pub struct Renderer {
     fields: Vec<Field>,
     near: f64,
     lists: Lists,
+    /// The view that `lists` holds.
+    listed: Option<ViewUniform>,
     layers: Vec<Layer>,
     max_pixels: usize,
     max_tiles: usize,
@@ -66,6 +68,7 @@ impl Renderer {
             fields,
             near,
             lists,
+            listed: None,
             layers: Vec::new(),
             max_pixels: 0,
             max_tiles: 0,
@@ -78,14 +81,17 @@ impl Renderer {
     /// [`GpuError`] when buffers do not fit or the device is lost.
     pub fn render(&mut self, camera: &Camera) -> Result<Vec<RenderedImage>, GpuError> {
         let view = ViewUniform::new(camera, self.near, self.geometry.count, 0);
+        self.listed = None;
         self.with_room(&view, |renderer| {
-            for (layer, field) in renderer.layers.iter().zip(&renderer.fields) {
+            for index in 0..renderer.fields.len() {
                 // The degree is a property of the field, the rest of the view.
                 let view = ViewUniform {
-                    sh_degree: field.degree,
+                    sh_degree: renderer.fields[index].degree,
                     ..view
                 };
-                renderer.listed(&view, |recorder| layer.record(&renderer.raster, recorder));
+                renderer.over_lists(&view, |renderer, recorder| {
+                    renderer.layers[index].record(&renderer.raster, recorder);
+                });
             }
             Ok(())
         })?;
@@ -102,23 +108,38 @@ impl Renderer {
             .collect()
     }
 
-    /// Median depth as `camera` sees it, going on from `pixels` of [`blend_depth`].
+    /// Median depth as `camera` sees it, going on from `pixels` of [`blend_depth`]; over the lists
+    /// of [`Renderer::render`] where it drew the same view last.
     pub(super) fn depth(&mut self, camera: &Camera, pixels: &[f32]) -> Result<Vec<f32>, GpuError> {
         let view = ViewUniform::new(camera, self.near, self.geometry.count, 0);
         self.with_room(&view, |renderer| {
-            let (raster, tiles) = (&renderer.raster, view.tile_count());
-            let blend =
-                |recorder: &mut _| blend_depth(raster, &renderer.lists, pixels, tiles, recorder);
-            renderer.listed(&view, blend)?.read(&raster.gpu)
+            let blend = |renderer: &Self, recorder: &mut _| {
+                let (raster, lists) = (&renderer.raster, &renderer.lists);
+                blend_depth(raster, lists, pixels, view.tile_count(), recorder)
+            };
+            let drawn = renderer.over_lists(&view, blend)?;
+            drawn.read(&renderer.raster.gpu)
         })
     }
 
-    /// Lists a view, and what is recorded over its lists.
-    fn listed<T>(&self, view: &ViewUniform, record: impl FnOnce(&mut Recorder) -> T) -> T {
+    /// Records over the lists of a view, which are made where they hold another one: geometry
+    /// decides about them, and no field.
+    fn over_lists<T>(
+        &mut self,
+        view: &ViewUniform,
+        record: impl FnOnce(&Self, &mut Recorder) -> T,
+    ) -> T {
         let mut recorder = Recorder::new(&self.raster.gpu);
         self.lists.set_view(&self.raster.gpu, view);
-        self.lists.record(&self.raster, &mut recorder);
-        let recorded = record(&mut recorder);
+        let geometric = ViewUniform {
+            sh_degree: 0,
+            ..*view
+        };
+        if self.listed != Some(geometric) {
+            self.lists.record(&self.raster, &mut recorder);
+            self.listed = Some(geometric);
+        }
+        let recorded = record(self, &mut recorder);
         recorder.submit();
         recorded
     }
@@ -127,7 +148,7 @@ impl Renderer {
     fn with_room<T>(
         &mut self,
         view: &ViewUniform,
-        draw: impl Fn(&Self) -> Result<T, GpuError>,
+        draw: impl Fn(&mut Self) -> Result<T, GpuError>,
     ) -> Result<T, GpuError> {
         // Of two views, the one with fewer pixels may have more tiles.
         if view.pixel_count() > self.max_pixels || view.tile_count() > self.max_tiles {
@@ -147,6 +168,7 @@ impl Renderer {
         let raster = &self.raster;
         self.max_pixels = self.max_pixels.max(view.pixel_count());
         self.max_tiles = self.max_tiles.max(view.tile_count());
+        self.listed = None;
         self.lists = Lists::new(raster, &self.geometry, self.max_tiles, capacity)?;
         self.layers = self
             .fields

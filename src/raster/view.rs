@@ -7,7 +7,7 @@ use crate::capture::Camera;
 
 /// Twin of `struct View` in `shaders/common/view.wgsl`.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ViewUniform {
     /// World-to-camera rows, translation last.
     pub rows: [[f32; 4]; 3],

@@ -11,7 +11,7 @@ use super::{
     RunError,
     against::Against,
     flight::{FlightOutput, page_row},
-    teach::teacher_or_photos,
+    teach::{TeachOptions, teacher_or_photos},
 };
 use crate::{
     capture::{Dataset, View},
@@ -45,7 +45,8 @@ const MAX_ROWS: usize = 24;
 pub struct EvalOptions {
     /// Run folder; the newest run by default.
     pub run: Option<PathBuf>,
-    /// Teacher to measure beside the scene.
+    /// Teacher to measure beside the scene; by default the one that colored the run, where it was
+    /// one.
     pub teacher: Option<PathBuf>,
     pub teacher_settings: TeacherSettings,
     /// COLMAP folder, where it is not the one that `fit` noted.
@@ -86,6 +87,8 @@ pub fn eval(
     }
     let run = Run::find(options.run.as_deref(), LockMode::Writing)?;
     let (folder, report) = (&run.folder, &run.report);
+    let named = options.teacher.is_some();
+    let options = &with_own_teacher(options, report);
     observe(Event::begins(Stage::Model));
     let scene = load(&run, options, observe)?;
     let _kept = keep(options, &scene, report);
@@ -101,7 +104,15 @@ pub fn eval(
     let mut lpips = options.lpips.as_deref().map(Lpips::open).transpose()?;
     let detector = options.detector.as_deref().map(Detector::open);
     let detector = detector.transpose()?;
-    let mut teacher = ask(options, &run, &scene, observe)?;
+    let mut teacher = match ask(options, &run, &scene, observe) {
+        Err(RunError::Teacher(error)) if !named => {
+            observe(Event::Warning(format!(
+                "the run's teacher is not measured: {error}"
+            )));
+            None
+        }
+        asked => asked?,
+    };
     observe(Event::begins(Stage::Device));
     let gpu = Gpu::open()?;
     let raster = report.luma.settings.raster(&gpu);
@@ -346,6 +357,18 @@ fn ask(
     let mut told = |progress: Progress<'_>| observe(Event::from(progress));
     let asked = MeasuredTeacher::ask(teacher, frames, dataset, &mut told);
     Ok(Some(asked.map_err(covers_nothing(options, dataset))?))
+}
+
+/// The options with the run's own teacher, where none is named and a single one colored it.
+fn with_own_teacher(options: &EvalOptions, report: &Report) -> EvalOptions {
+    let mut options = options.clone();
+    let own = TeachOptions::of_run(report);
+    let colored_by = (report.chroma.as_ref()).map_or(0, |chroma| chroma.teachers.len());
+    if let (None, 1, [(path, _)]) = (&options.teacher, colored_by, &own.teachers[..]) {
+        options.teacher = Some(path.clone());
+        options.teacher_settings = own.settings;
+    }
+    options
 }
 
 fn named_teacher(options: &EvalOptions, dataset: &Dataset) -> Option<PathBuf> {

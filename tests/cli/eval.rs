@@ -104,6 +104,25 @@ fn a_run_beside_its_network_and_the_baseline() {
 }
 
 #[test]
+fn the_teacher_that_colored_the_run_is_measured_where_it_still_is() {
+    let place = place_with_run();
+    let model = onnx("ddcolor_tiny.onnx");
+    let found = evaluated(&place, &[]);
+    assert_eq!(found["teacher"]["name"], "ddcolor_tiny.onnx");
+    let named = evaluated(&place, &["--teacher", &model]);
+    assert_eq!(found["pictures"], named["pictures"]);
+    // Elsewhere, or gone.
+    let report = String::from_utf8(place.read("runs/scene/report.json")).expect("text");
+    place.write(
+        "runs/scene/report.json",
+        report.replace(&model, "gone.onnx"),
+    );
+    let said = place.run(&["eval", "--frames", "2"]);
+    let warned = "warning: the run's teacher is not measured: ";
+    assert!(said.stderr.contains(warned), "{}", said.stderr);
+}
+
+#[test]
 fn the_photos_as_a_teacher_make_no_error() {
     let place = place_with_run();
     let found = evaluated(&place, &["--teacher", "scene/images", "--baselines"]);
@@ -207,9 +226,9 @@ fn the_page_shows_every_view_with_files_that_are_there() {
         assert_eq!([image.width(), image.height()], scene::SIZE, "{file}");
         sources += 1;
     }
-    // Photo, luma, ours and two maps a view, luma and ours a frame, and the first where there is
+    // Photo, luma, teacher, ours and three maps a view, luma and ours a frame, and the first where there is
     // no film.
-    assert_eq!(sources, 5 * scene::HELD_OUT + 2 * 3 + usize::from(!film));
+    assert_eq!(sources, 7 * scene::HELD_OUT + 2 * 3 + usize::from(!film));
     assert!(page.contains(&scene::name(8)), "{page}");
 
     // A second evaluation leaves nothing of the first, a new coloring neither.

@@ -183,3 +183,37 @@ fn the_median_lies_between_the_depths_where_opacity_passes_half() {
     // A pixel at which opacity is half but for rounding may fall to either side.
     assert!(known > 5000 && astray < 20, "{known} {astray}");
 }
+
+/// Lists are made once for a view, and anew for another one or another size.
+#[test]
+fn a_renderer_draws_the_view_that_it_is_given() {
+    let (splats, _) = wall();
+    let fields = [0, 2].map(|degree| random_field(&splats, degree));
+    let cameras = [0.12, -0.2].map(|angle| camera(DVec3::new(0.5, -0.2, 0.3), angle));
+    let mut renderer =
+        SceneRenderer::new(&raster(), &splats, &[&fields[0], &fields[1]], 0.01).unwrap();
+    let shown = cameras.each_ref().map(|camera| {
+        let mut alone = |field| {
+            let mut renderer = SceneRenderer::new(&raster(), &splats, &[field], 0.01).unwrap();
+            renderer.render(camera).unwrap().remove(0)
+        };
+        let apart: Vec<_> = fields.iter().map(&mut alone).collect();
+        assert_eq!(renderer.render(camera).unwrap(), apart);
+        renderer.depth(camera).unwrap()
+    });
+    assert_ne!(bits(&shown[0]), bits(&shown[1]));
+    // The view before this one was the other.
+    assert_eq!(bits(&renderer.depth(&cameras[0]).unwrap()), bits(&shown[0]));
+}
+
+fn random_field(splats: &Splats, degree: u32) -> ShField {
+    let mut field = ShField::zeros(splats.len(), degree, 1);
+    for (i, value) in field.coefficients.iter_mut().enumerate() {
+        *value = (i as f32 * 0.7).sin();
+    }
+    field
+}
+
+fn bits(depths: &[f32]) -> Vec<u32> {
+    depths.iter().map(|depth| depth.to_bits()).collect()
+}
