@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
-use super::{ChosenDegree, ChromaError, ChromaObserver, ChromaProgress};
+use super::{ChosenDegree, ChromaError, ChromaObserver, ChromaProgress, Correction, Task};
 use crate::{
     gpu::{Buffer, Gpu},
     splats::ShField,
@@ -18,12 +18,12 @@ pub struct ChromaCheckpoint {
     pub(super) solver: SolverState,
 }
 
-/// Decisions made before the solver began.
+/// Decisions made so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct SolveDecisions {
     /// The degree that views held back have chosen, where they were asked.
     pub chosen: Option<ChosenDegree>,
-    /// Disagreement of the views before and after corrections that were taken back.
+    /// Disagreement of the views without and with corrections that were taken back.
     pub uncorrected: Option<[f64; 2]>,
     /// The solver's last report.
     pub last: Option<ChromaProgress>,
@@ -63,6 +63,14 @@ pub(super) trait Interruptible {
 
     /// Goes on from a state of the same problem; `false` where it is of another.
     fn go_on_from(&mut self, state: &SolverState) -> bool;
+
+    /// Corrections so far that bring each view into line with the others.
+    fn corrections(&self) -> Result<Vec<(Task, Correction)>, ChromaError> {
+        Ok(Vec::new())
+    }
+
+    /// Takes these back and goes on without.
+    fn uncorrect(&mut self) {}
 }
 
 /// A solver's counters on the host.

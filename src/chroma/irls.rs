@@ -32,7 +32,7 @@ const RGB_UNITS: f64 = 100.0;
 /// The loss levels off after so many rounds at the earliest, and once one moves the colors by
 /// less than so many CIELAB units: what is far off at first may be right once the rest is in
 /// place.
-const PLAIN_ROUNDS: usize = 4;
+pub(super) const PLAIN_ROUNDS: usize = 4;
 const PLAIN_MOVES: f64 = 2.0;
 
 /// Rounds after which the colors are anchored at the earliest, and not before the loss levels
@@ -437,6 +437,20 @@ impl Interruptible for IrlsSolver<'_> {
         self.spent = rounds.spent;
         self.seconds = rounds.seconds;
         fits
+    }
+
+    fn corrections(&self) -> Result<Vec<(Task, Correction)>, ChromaError> {
+        Self::corrections(self)
+    }
+
+    fn uncorrect(&mut self) {
+        let none = vec![Correction::NONE; self.passes.tasks.len()];
+        for (_, corrections) in self.passes.corrections.kept() {
+            corrections.write(self.gpu(), &none);
+        }
+        self.settings.correct_views = false;
+        self.corrected = false;
+        self.steps.restart(self.gpu());
     }
 }
 

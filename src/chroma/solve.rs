@@ -56,7 +56,7 @@ pub fn solve(
 /// State to go on from, and the call after each round.
 pub(super) type Between<'a> = (
     Option<&'a SolverState>,
-    &'a mut dyn FnMut(&dyn Interruptible) -> Result<bool, ChromaError>,
+    &'a mut dyn FnMut(&mut dyn Interruptible) -> Result<bool, ChromaError>,
 );
 
 /// [`solve`] that can be interrupted and go on.

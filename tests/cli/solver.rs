@@ -1,5 +1,6 @@
 //! `colorize --solver irls`, the default.
 
+use gs_chroma::splats::read_ply;
 use image::imageops::{FilterType, resize};
 use image::{Rgb, RgbImage};
 
@@ -46,7 +47,7 @@ fn the_default_solver_says_what_it_did() {
 /// A teacher that agrees about what COLMAP's points show and contradicts itself elsewhere: to
 /// bring its views into line there would set them apart here.
 #[test]
-fn views_that_would_disagree_more_are_taken_as_they_are() {
+fn views_that_corrections_do_not_help_are_taken_as_they_are() {
     let place = place_with_run();
     scene::write_tracks(&place.path("scene"), |[x, _]| x < 26.0);
     for index in 0..scene::VIEWS {
@@ -72,7 +73,13 @@ fn views_that_would_disagree_more_are_taken_as_they_are() {
         done.stderr.contains("view correction is off")
     };
     assert!(told("on") && !told("off"));
-    assert!(place.read("on.ply") == place.read("off.ply"));
+    // Rounds with corrections came first, so that colors are nearly those without.
+    let [on, off] = ["on.ply", "off.ply"].map(|name| read_ply(&place.path(name)).expect(name));
+    let [on, off] = [on, off].map(|read| read.splats.sh.coefficients);
+    let apart = on.iter().zip(&off).map(|(x, y)| (x - y).abs());
+    let apart = apart.sum::<f32>() / on.len() as f32;
+    let size = off.iter().map(|value| value.abs()).sum::<f32>() / off.len() as f32;
+    assert!(apart < 0.15 * size, "{apart} of {size}");
 }
 
 #[test]

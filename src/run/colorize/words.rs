@@ -44,10 +44,10 @@ impl Coloring<'_> {
                 journal.tell(Event::Note(table(effects)));
                 Event::progress(Stage::Solving, rounds, total, "")
             }
-            ColorizeEvent::Uncorrected { before, after } => Event::Note(format!(
-                "view correction is off: corrected, the teacher's views would disagree more ({:.0} % instead of {:.0} % of its colors' mean square)",
-                100.0 * after,
-                100.0 * before
+            ColorizeEvent::Uncorrected { without, with } => Event::Note(format!(
+                "view correction is off: the teacher's views agree no better with it (they differ by {:.1} % of its colors' mean square, {:.1} % without)",
+                100.0 * with,
+                100.0 * without
             )),
             ColorizeEvent::Solving(progress) => {
                 journal.row(format_args!(
