@@ -99,13 +99,7 @@ fn of_scene(page: &mut Page, report: &Report) {
     let luma = &report.luma;
     let held_out = luma.held_out.map_or_else(
         || "no photo was held out to measure it on".to_owned(),
-        |quality| {
-            format!(
-                "held-out photos: {}, SSIM {:.3}",
-                quality.psnr_in_words(),
-                quality.ssim
-            )
-        },
+        |quality| quality.in_words(),
     );
     let names = |on: bool| {
         let effects = report.effects.iter().filter(|effect| effect.on == on);
