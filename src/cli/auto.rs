@@ -39,16 +39,15 @@ const FALLBACKS: &[(Fallback, &str)] = &[
 
 /// Do everything: from photos or a film to a colored scene.
 ///
-/// Runs prepare, fit, colorize, frames, export and eval, and writes the photos or the film in
-/// color, too. Of a film with several shots each becomes
-/// a scene of its own, and all become one film; --shot or --start chooses one. Steps whose result
-/// is there are skipped, so the same command continues after an interruption. Options of fit and
-/// colorize hold as there; --memory-limit for both.
+/// Runs prepare, fit, colorize, frames, export and eval, with most options of prepare and fit;
+/// --memory-limit is for colorize, too. Of a film with several shots each becomes a scene of its
+/// own, and all become one film; --shot or --start chooses one. Steps whose result is there are
+/// skipped, so the same command continues after an interruption.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma teacher fetch ddcolor-tiny
   gs-chroma auto photos/ --teacher ddcolor-tiny -o out
-  gs-chroma auto film.mp4 --start 1:05 --seconds 20 --teacher ddcolor-tiny -o out")]
+  gs-chroma auto film.mp4 --start 1:05 --end 1:25 --teacher ddcolor-tiny -o out")]
 pub struct Auto {
     #[command(flatten)]
     input: InputArguments,

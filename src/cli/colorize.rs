@@ -63,8 +63,9 @@ pub struct Colorize {
     colmap: Option<PathBuf>,
     /// Network, folder of colored photos, or photos; repeatable.
     ///
-    /// A network is a name of `gs-chroma teacher list` or a .onnx file. Images of a folder are named
-    /// like the photos. The word photos means the photos' own colors. Several count as their mean.
+    /// A network is a name of `gs-chroma teacher list` or a .onnx file. Images of a folder are
+    /// named like the photos. The word photos means the photos' own colors. Several count as their
+    /// mean.
     #[arg(
         long,
         value_name = "TEACHER",
@@ -75,8 +76,9 @@ pub struct Colorize {
     /// Program that colors photos: 'python mine.py {in} {out}'.
     ///
     /// {in} is a gray PNG of 8 bits, {out} where to write the colored picture, of any size. For
-    /// {in_dir} and {out_dir}, all photos at once, it starts once, and names its pictures like those it is given. Words
-    /// are split as a shell does, but no shell runs: variables and pipes mean nothing.
+    /// {in_dir} and {out_dir}, all photos at once, it starts once, and names its pictures like
+    /// those it is given. Words are split as a shell does, but no shell runs: variables and pipes
+    /// mean nothing.
     #[arg(long, value_name = "COMMAND", value_parser = command, help_heading = TEACHER, hide_short_help = true)]
     teacher_command: Option<String>,
     /// Weight of each teacher, in order [default: equal].
@@ -130,7 +132,8 @@ pub struct Colorize {
     robust: Option<f32>,
     /// Color what no view shows [default: on].
     ///
-    /// It takes the colors of its neighbors and of what looks like it. With --solver adam the default is off.
+    /// It takes the colors of its neighbors and of what looks like it. With --solver adam the
+    /// default is off.
     #[arg(long, value_parser = switch(), value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
     fill: Option<bool>,
     /// Match the teacher's saturation [default: on].

@@ -39,7 +39,7 @@ const RECIPES: &[(Peer, &str)] = &[
 #[command(after_long_help = "Example:
   gs-chroma eval runs/house --teacher ddcolor-tiny --baselines
   gs-chroma eval runs/house --gray-frames gray/
-  gs-chroma eval runs/house --against film=colored/ --against brush=brush.ply")]
+  gs-chroma eval runs/house --against film=colored/ --against brush=b.ply")]
 pub struct Eval {
     /// Run folder [default: newest under runs/].
     run: Option<PathBuf>,
@@ -58,8 +58,8 @@ pub struct Eval {
     recipe: Vec<Peer>,
     /// Also measure another program's splats or frames; repeatable.
     ///
-    /// Splats lie in COLMAP's frame. A folder of colored frames of the path holds a PNG or JPEG for each frame of
-    /// --gray-frames, of the same size and in the same order.
+    /// Splats lie in COLMAP's frame. A folder of colored frames of the path holds a PNG or JPEG for
+    /// each frame of --gray-frames, of the same size and in the same order.
     #[arg(long, help_heading = COMPARE, value_name = "NAME=PATH", value_parser = named)]
     against: Vec<(String, PathBuf)>,
     /// Limit device memory for --baselines and --recipe, in MiB.
@@ -70,7 +70,8 @@ pub struct Eval {
     frames: u32,
     /// Folder of optical flow [default: from depth and poses].
     ///
-    /// Between the path's frames: Middlebury files for each pair and direction: 0000-0007.flo, 0007-0000.flo.
+    /// Between the path's frames: Middlebury files for each pair and direction: 0000-0007.flo,
+    /// 0007-0000.flo.
     #[arg(long, help_heading = MEASURES, value_name = "DIR")]
     flow: Option<PathBuf>,
     /// Perceptual distance such as LPIPS.

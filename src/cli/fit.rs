@@ -61,8 +61,8 @@ pub struct Fit {
     time_limit: Option<f64>,
     /// Stop once held-out views reach this PSNR, in dB.
     ///
-    /// Their mean counts. Settles before it ends. At most the work of --preset [default: paper]; exit code 1 if the
-    /// target is out of reach.
+    /// Their mean counts. Settles before it ends. At most the work of --preset [default: paper];
+    /// exit code 1 if the target is out of reach.
     #[arg(long, value_name = "DB", value_parser = positive::<f64>, conflicts_with = "iterations", help_heading = BUDGET)]
     target_psnr: Option<f64>,
     #[command(flatten)]

@@ -26,8 +26,9 @@ pub(super) struct LumaArguments {
     max_splats: Option<u32>,
     /// Rules of densification [default: own].
     ///
-    /// 3dgs: as published (Kerbl et al. 2023): splits and clones by signed gradients, opacity resets, removal of large Gaussians, an SH
-    /// degree every 1,000 iterations, and its learning rates; without early stopping.
+    /// 3dgs: as published (Kerbl et al. 2023): splits and clones by signed gradients, opacity
+    /// resets, removal of large Gaussians, an SH degree every 1,000 iterations, and its learning
+    /// rates; without early stopping.
     #[arg(long, value_parser = one_of(RULES), hide_possible_values = true, value_name = "own|3dgs", help_heading = EXPERT)]
     densify: Option<DensifyRules>,
     /// Leave black what no photo shows, instead of surrounding the scene with a shell of gray.
@@ -41,8 +42,9 @@ pub(super) struct LumaArguments {
     memory_limit: Option<u64>,
     /// Stop early when twice the iterations would gain less, in dB.
     ///
-    /// Training is rolled back to the best. 0.1 if no number follows [default: 0.3 with the preset balanced, 0.1 with paper, never with
-    /// draft, --iterations or --time-limit]. With --target-psnr only if the target is out of reach.
+    /// Training is rolled back to the best. 0.1 if no number follows [default: 0.3 with the preset
+    /// balanced, 0.1 with paper, never with draft, --iterations or --time-limit]. With
+    /// --target-psnr only if the target is out of reach.
     #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, value_parser = positive::<f64>, help_heading = BUDGET, hide_short_help = true)]
     stop_when_flat: Option<Option<f64>>,
     /// Trade accuracy of training for time.

@@ -92,10 +92,11 @@ enum Command {
 /// The program with all its options.
 fn program() -> clap::Command {
     let program = Cli::command().max_term_width(bar::WIDTH);
-    let program = program.mut_subcommand("auto", auto::Auto::for_experts);
-    let program = program.mut_subcommands(|command| match command.has_subcommands() {
-        true => command,
-        false => headings::in_order(&command),
+    let program = program.mut_subcommands(|command| match command.get_name() {
+        "auto" => headings::in_order(&auto::Auto::for_experts(command)),
+        // Its options are those of its own commands.
+        "teacher" => command,
+        _ => headings::in_order(&command),
     });
     let template = groups::template(&program);
     program.help_template(template)

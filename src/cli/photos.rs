@@ -75,7 +75,8 @@ pub(super) struct Photos {
     photos: PhotoArguments,
     /// Folder of masks, black where nothing counts [default: masks/, else alpha].
     ///
-    /// By default beside images/. The mask of the photo b.jpg is b.jpg.png or b.png. alpha takes the photos' transparency.
+    /// By default beside images/. The mask of the photo b.jpg is b.jpg.png or b.png. alpha takes
+    /// the photos' transparency.
     #[arg(long, value_name = "DIR|alpha|off", help_heading = MASKS)]
     masks: Option<String>,
     /// Use all photos, even if they contradict their poses or COLMAP's points.

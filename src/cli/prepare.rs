@@ -137,8 +137,9 @@ impl InputArguments {
 
 /// Find the camera poses of photos or a film, for fit.
 ///
-/// Writes a COLMAP folder. Runs FFmpeg and COLMAP: frames of one shot, masks of black borders, poses. The same command
-/// continues after an interruption, and redoes only what its options or your photos have changed.
+/// Writes a COLMAP folder. Runs FFmpeg and COLMAP: frames of one shot, masks of black borders,
+/// poses. The same command continues after an interruption, and redoes only what its options or
+/// your photos have changed.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma prepare photos/ -o house

@@ -26,7 +26,7 @@ use crate::{
 #[command(after_long_help = "Example:
   gs-chroma tradeoff house
   gs-chroma tradeoff house --preset balanced -- --max-side 800 --masks off
-  gs-chroma tradeoff house --teacher ddcolor-tiny --knobs iterations,max-side,rounds --budget 60")]
+  gs-chroma tradeoff house --teacher ddcolor-tiny --knobs rounds --budget 60")]
 pub struct Tradeoff {
     /// COLMAP folder with images/ and sparse/, or one with transforms.json.
     colmap_dir: PathBuf,

@@ -73,7 +73,7 @@ fn each_step_is_done_once_and_again_when_what_it_is_made_from_changes() {
         assert!(place.path(file).is_file(), "{file}");
     }
     let report = place.report("out/run");
-    assert_eq!(report["capture"]["load"]["channel"], "g");
+    assert_eq!(report["capture"]["channel"], "g");
     let limits = ["luma", "chroma"].map(|stage| report[stage]["settings"]["memory_limit"].clone());
     assert_eq!(limits, [900 << 20; 2]);
     // The folder stands for its run, unless it has one for each shot.
