@@ -19,11 +19,14 @@ use steps::StepRecords;
 
 use crate::{
     capture::{Film, is_capture, originals},
-    chroma::teacher::{Teacher, TeacherSettings},
+    chroma::{
+        ChromaSettings,
+        teacher::{Teacher, TeacherSettings},
+    },
     gpu::Gpu,
     prepare::{CameraMotion, PrepareError, PrepareOptions, digest, digest_of, prepare},
     run::{
-        ColorizeRequest, EvalOptions, ExportOptions, FitRequest, FramesOptions, Preset, RunError,
+        ColorizeRequest, EvalOptions, ExportOptions, FitRequest, FramesOptions, RunError,
         TeachOptions, colorize, eval, export, fit, frames,
     },
     store::{
@@ -48,8 +51,9 @@ pub struct AutoOptions {
     pub teacher_settings: TeacherSettings,
     /// A folder of painted hints.
     pub hints: Option<PathBuf>,
-    /// Length of the training; by the device by default.
-    pub preset: Option<Preset>,
+    /// Options of the training; its folders and checkpoints are ignored. The coloring has its limit
+    /// of memory.
+    pub fit: FitRequest,
     /// Codec of the film or the pictures in color.
     pub codec: Option<Codec>,
     /// Frames a second of the film in color; by default those of the film.
@@ -166,13 +170,13 @@ fn make_scene(
     let from = digest_of(&[
         &capture?.concat(),
         &masks(house)?,
-        &json!(options.preset).to_string(),
+        &json!(options.fit).to_string(),
     ]);
     let mut asked = FitRequest {
+        colmap_dir: house.to_owned(),
         output: Some(run.path().to_owned()),
-        preset: options.preset,
         checkpoints: checkpoints(options),
-        ..FitRequest::new(house.to_owned())
+        ..options.fit.clone()
     };
     let results_of = [&*run.luma(), &run.report()];
     let stages = asked.stages();
@@ -181,12 +185,17 @@ fn make_scene(
         fit(&asked, observe).map(drop)
     })?;
 
+    let settings = ChromaSettings {
+        memory_limit: options.fit.settings.memory_limit,
+        ..ChromaSettings::irls()
+    };
     let from = digest_of(&[
         &digest(&run.luma())?,
         &*options.teacher.to_string_lossy(),
         &teacher_digest(&options.teacher)?,
         &json!(options.teacher_settings).to_string(),
         hints,
+        &json!(settings).to_string(),
     ]);
     let mut asked = ColorizeRequest {
         run: Some(run.path().to_owned()),
@@ -196,6 +205,7 @@ fn make_scene(
             hints: options.hints.clone(),
             ..TeachOptions::default()
         },
+        settings,
         checkpoints: checkpoints(options),
         ..ColorizeRequest::default()
     };

@@ -215,7 +215,7 @@ COMMANDS = {
 FILMS = {
     "apac-sound": ("phone.mov", "frames OUT/film -o OUT/out.mp4"),
     "sound-before-pictures": ("late.mkv", "frames OUT/film -o OUT/out.mp4"),
-    "frames-other-rate": ("../sound-before-pictures/late.mkv", "frames OUT/film -o OUT/out.mp4 --frame-rate 10"),
+    "frames-other-rate": ("../sound-before-pictures/late.mkv", "frames OUT/film -o OUT/out.mp4 --fps 10"),
     "hdr-film": ("pq.mp4", None),
     "mpegts-first-frames: .mts": ("camcorder.mts", None),
     "mpegts-first-frames: .ts": ("recording.ts", None),

@@ -25,6 +25,7 @@ use crate::{
     store::{
         StoreError, files,
         film::{FilmWriter, Piece, Purpose},
+        folder::SHOTS_OF_AUTO,
         originals,
     },
     subject::SubjectError,
@@ -133,7 +134,10 @@ pub fn reel(
     let spans: Vec<[f64; 2]> = parts.iter().map(|part| part.span).collect();
     let each: Vec<AutoOptions> = (1..=parts.len())
         .map(|number| {
-            let output = options.output.join("shots").join(format!("{number:03}"));
+            let output = options
+                .output
+                .join(SHOTS_OF_AUTO)
+                .join(format!("{number:03}"));
             AutoOptions {
                 prepare: PrepareOptions {
                     output: output.join("house"),
@@ -325,6 +329,7 @@ fn without_scene(
             fallback,
             options.frame_rate,
             options.codec,
+            options.fit.load,
             options.teacher,
             options.teacher_settings
         ])
@@ -339,6 +344,7 @@ fn without_scene(
     tell(AutoEvent::Begins(Step::Frames, Vec::new()));
     let asked = PlainFramesOptions {
         capture,
+        load: options.fit.load.clone(),
         teacher,
         output: colored.to_owned(),
         codec: options.codec,

@@ -1,8 +1,8 @@
 //! Commands for programs that have this one as a library: arguments in, JSON out.
 
-use clap::Parser;
+use clap::FromArgMatches;
 
-use super::{Cli, CliError, Command};
+use super::{Cli, CliError, Command, program};
 use crate::{
     run::{eval, export, frames},
     tell::Observer,
@@ -27,7 +27,8 @@ pub enum AnswerError {
 pub fn answer(arguments: &[String], observe: &mut Observer<'_>) -> Result<String, AnswerError> {
     let words = ["gs-chroma"].into_iter();
     let words = words.chain(arguments.iter().map(String::as_str));
-    let cli = Cli::try_parse_from(words).map_err(usage)?;
+    let matches = program().try_get_matches_from(words).map_err(usage)?;
+    let cli = Cli::from_arg_matches(&matches).map_err(usage)?;
     let failed = |error| AnswerError::Failed(CliError::Run(error));
     let json = |result: serde_json::Result<String>| result.unwrap_or_default();
     match cli.command {

@@ -2,15 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, Command, Id};
 
 use super::{
     CliError,
+    effects::EffectArguments,
     frames::CODECS,
-    headings::{BUDGET, OUTPUT, TEACHER},
+    headings::{BUDGET, EXPERT, OUTPUT, TEACHER},
     interrupt::interrupt,
+    luma::LumaArguments,
     network::NetworkArguments,
     next,
+    photos::PhotoArguments,
     prepare::InputArguments,
     print,
     progress::Progress,
@@ -22,7 +25,7 @@ use crate::{
         outcome::{Fallback, Outcome, Reel, ReelShot},
         reel,
     },
-    run::Preset,
+    run::{FitRequest, Preset},
     store::Codec,
 };
 
@@ -34,24 +37,27 @@ const FALLBACKS: &[(Fallback, &str)] = &[
     ),
 ];
 
-/// Do everything: from a film or photos to a colored scene, colored photos and a page.
+/// Do everything: from photos or a film to a colored scene.
 ///
-/// Runs prepare, fit, colorize, frames, export and eval. Of a film with several shots each becomes
-/// a scene of its own, and all become one film; --shot or --start chooses one. Steps whose result
-/// is there are skipped, so the same command continues after an interruption.
+/// Runs prepare, fit, colorize, frames, export and eval, with most options of prepare and fit;
+/// --memory-limit is for colorize, too. Of a film with several shots each becomes a scene of its
+/// own, and all become one film; --shot or --start chooses one. Steps whose result is there are
+/// skipped, so the same command continues after an interruption.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma teacher fetch ddcolor-tiny
   gs-chroma auto photos/ --teacher ddcolor-tiny -o out
-  gs-chroma auto film.mp4 --start 1:05 --seconds 20 --teacher ddcolor-tiny -o out")]
+  gs-chroma auto film.mp4 --start 1:05 --end 1:25 --teacher ddcolor-tiny -o out")]
 pub struct Auto {
     #[command(flatten)]
     input: InputArguments,
     /// Folder for everything.
     #[arg(short, long, value_name = "DIR", value_parser = folder(), help_heading = OUTPUT)]
     output: PathBuf,
-    /// Network (name or .onnx), folder of colored photos, or photos for their own colors.
-    #[arg(long, help_heading = TEACHER, value_name = "NAME|FILE.onnx|DIR|photos")]
+    /// Network, folder of colored photos, or photos.
+    ///
+    /// As for colorize.
+    #[arg(long, help_heading = TEACHER, value_name = "TEACHER")]
     teacher: PathBuf,
     #[command(flatten)]
     network: NetworkArguments,
@@ -64,6 +70,12 @@ pub struct Auto {
     /// How much work to do [default: paper on a GPU, else draft].
     #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
+    #[command(flatten)]
+    luma: LumaArguments,
+    #[command(flatten)]
+    effects: EffectArguments,
+    #[command(flatten)]
+    photos: PhotoArguments,
     /// How the film in color is coded [default: h264].
     #[arg(long, hide_short_help = true, help_heading = OUTPUT, value_name = "CODEC", value_parser = one_of(CODECS))]
     codec: Option<Codec>,
@@ -75,7 +87,21 @@ pub struct Auto {
     json: bool,
 }
 
+/// Groups of options that only the steps need.
+const OF_STEPS: [&str; 3] = ["LumaArguments", "EffectArguments", "PhotoArguments"];
+
 impl Auto {
+    /// The command with the options of its steps among those rarely used.
+    pub(super) fn for_experts(command: Command) -> Command {
+        let groups = command.get_groups();
+        let groups = groups.filter(|group| OF_STEPS.contains(&group.get_id().as_str()));
+        let of_steps: Vec<Id> = groups.flat_map(|group| group.get_args().cloned()).collect();
+        command.mut_args(|argument| match of_steps.contains(argument.get_id()) {
+            true => argument.help_heading(EXPERT),
+            false => argument,
+        })
+    }
+
     pub(super) fn run(self) -> Result<(), CliError> {
         let output = self.output;
         let options = AutoOptions {
@@ -84,7 +110,13 @@ impl Auto {
             teacher: self.teacher,
             teacher_settings: self.network.settings(),
             hints: self.hints,
-            preset: self.preset,
+            fit: FitRequest {
+                preset: self.preset,
+                settings: self.luma.overlay(),
+                load: self.photos.options(),
+                overrules: self.effects.overrules(),
+                ..FitRequest::default()
+            },
             codec: self.codec,
             frame_rate: None,
             without_eval: self.no_eval,

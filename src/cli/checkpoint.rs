@@ -12,11 +12,11 @@ use crate::store::{CheckpointOptions, EVERY};
 /// Options of checkpoints.
 #[derive(Args)]
 pub struct CheckpointArguments {
-    /// Continue from the checkpoint in the run folder; without one, start anew.
+    /// Continue from the run's checkpoint, if there is one.
     #[arg(long, help_heading = OUTPUT)]
     resume: bool,
     /// Minutes between checkpoints; more if they take over 2 % of the time.
-    #[arg(long, help_heading = EXPERT, hide_short_help = true, value_name = "MIN|off", default_value = EVERY.to_string(), value_parser = minutes)]
+    #[arg(long, help_heading = EXPERT, value_name = "MIN|off", default_value = EVERY.to_string(), value_parser = minutes)]
     checkpoint: Minutes,
 }
 

@@ -43,7 +43,7 @@ const SOLVERS: &[(SolverKind, &str)] = &[
 /// Last iteration of the paper's schedule, counted from the start of stage 1.
 const PAPER_UNTIL: u32 = 30_000;
 
-/// Color a gray run or splat file, with a colorization network or colored photos.
+/// Color a gray scene with a network or with colored photos.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma teacher fetch ddcolor-tiny
@@ -56,33 +56,37 @@ With photos colored by hand, and with strokes:
 Gray splats of another program:
   gs-chroma colorize gray.ply --colmap house --teacher ddcolor-tiny")]
 pub struct Colorize {
-    /// Run folder, or a gray splat file with --colmap [default: newest under runs/].
+    /// Run folder, or gray splats with --colmap [default: newest under runs/].
     run: Option<PathBuf>,
-    /// COLMAP folder: of a splat file, or of a run if it has moved since fit.
+    /// COLMAP folder of the splats, or of a moved run.
     #[arg(long, value_name = "COLMAP_DIR", help_heading = INPUT)]
     colmap: Option<PathBuf>,
-    /// Network (name or .onnx), folder of colored photos, or photos; repeat for their mean.
+    /// Network, folder of colored photos, or photos; repeatable.
     ///
-    /// Networks by name are listed by gs-chroma teacher list. Images of a folder are named like the
-    /// photos. The word photos means the photos' own colors.
+    /// A network is a name of `gs-chroma teacher list` or a .onnx file. Images of a folder are
+    /// named like the photos. The word photos means the photos' own colors. Several count as their
+    /// mean.
     #[arg(
         long,
-        value_name = "NAME|FILE.onnx|DIR|photos",
+        value_name = "TEACHER",
         required_unless_present_any = ["hints", "teacher_command"],
         help_heading = TEACHER
     )]
     teacher: Vec<PathBuf>,
-    /// Program that colors photos: 'python mine.py {in} {out}'; {in_dir} {out_dir} for all at once.
+    /// Program that colors photos: 'python mine.py {in} {out}'.
     ///
     /// {in} is a gray PNG of 8 bits, {out} where to write the colored picture, of any size. For
-    /// {in_dir} and {out_dir} it starts once, and names its pictures like those it is given. Words
-    /// are split as a shell does, but no shell runs: variables and pipes mean nothing.
+    /// {in_dir} and {out_dir}, all photos at once, it starts once, and names its pictures like
+    /// those it is given. Words are split as a shell does, but no shell runs: variables and pipes
+    /// mean nothing.
     #[arg(long, value_name = "COMMAND", value_parser = command, help_heading = TEACHER, hide_short_help = true)]
     teacher_command: Option<String>,
-    /// Weight of each --teacher, in the order given [default: equal].
+    /// Weight of each teacher, in order [default: equal].
     #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = positive::<f32>, requires = "teacher", help_heading = TEACHER)]
     weights: Vec<f32>,
-    /// Folder of painted strokes, on transparency or on the photo, named like the photos.
+    /// Folder of painted strokes, named like the photos.
+    ///
+    /// They lie on transparency or on the photo.
     #[arg(long, value_name = "DIR", help_heading = TEACHER)]
     hints: Option<PathBuf>,
     /// Whether a stroke colors the whole thing it lies on, in all views.
@@ -90,7 +94,9 @@ pub struct Colorize {
     /// off: paint counts only where it is, 50 times as much as a teacher.
     #[arg(long, action = ArgAction::Set, value_parser = switch(), value_name = "on|off", default_value = "on", help_heading = TEACHER, hide_short_help = true)]
     grow_hints: bool,
-    /// Strength of the teachers' colors; hints stay as painted.
+    /// Strength of the teachers' colors.
+    ///
+    /// Hints stay as painted.
     #[arg(long, value_name = "0..1", default_value_t = 1.0, value_parser = share::<f32>, help_heading = TEACHER)]
     strength: f32,
     #[command(flatten)]
@@ -102,39 +108,48 @@ pub struct Colorize {
     ///
     /// --solver adam until iteration 30,000, at three scales. With --until the same descent in
     /// proportion.
-    #[arg(long, conflicts_with = "solver", help_heading = BUDGET)]
+    #[arg(long, conflicts_with = "solver", help_heading = EXPERT)]
     as_paper: bool,
-    /// Maximum rounds of least squares; ends sooner once colors settle [default: 12].
+    /// Maximum rounds of least squares [default: 12].
+    ///
+    /// Ends sooner once colors settle.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = BUDGET)]
     rounds: Option<u32>,
-    /// Limit device memory, in MiB; views and Gaussians that do not fit are loaded view by view.
+    /// Limit device memory, in MiB.
+    ///
+    /// Views and Gaussians that do not fit are loaded view by view.
     #[arg(long, value_name = "MIB", value_parser = mebibytes(), help_heading = BUDGET)]
     memory_limit: Option<u64>,
-    /// Correct each view's saturation and tint to agree with the others [default: by evidence].
-    #[arg(long, value_parser = switch(), value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
+    /// Correct each view's saturation and tint [default: by evidence].
+    ///
+    /// They then agree with those of the other views.
+    #[arg(long, value_parser = switch(), value_name = "on|off", hide_possible_values = true, help_heading = EXPERT)]
     correct_views: Option<bool>,
-    /// Outlier threshold of the chroma loss, in CIELAB units; off for plain L1 [default: 10].
+    /// Outlier threshold of the chroma loss, in CIELAB units [default: 10].
     ///
-    /// With --solver adam the default is off.
-    #[arg(long, value_name = "UNITS|off", value_parser = robust, help_heading = QUALITY)]
+    /// off: plain L1. With --solver adam the default is off.
+    #[arg(long, value_name = "UNITS|off", value_parser = robust, help_heading = EXPERT)]
     robust: Option<f32>,
-    /// Color what no view shows well like its neighbors and what looks like it [default: on].
+    /// Color what no view shows [default: on].
     ///
-    /// With --solver adam the default is off.
+    /// It takes the colors of its neighbors and of what looks like it. With --solver adam the
+    /// default is off.
     #[arg(long, value_parser = switch(), value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
     fill: Option<bool>,
-    /// Scale colors to the teacher's saturation, as far as views agree [default: on].
+    /// Match the teacher's saturation [default: on].
     ///
-    /// Off where there are hints, and with --solver adam.
+    /// As far as views agree. Off where there are hints, and with --solver adam.
     #[arg(long, value_parser = switch(), value_name = "on|off", hide_possible_values = true, help_heading = QUALITY)]
     match_saturation: Option<bool>,
-    /// SH degree of chroma; auto tries it on training views that are held back.
+    /// SH degree of chroma.
+    ///
+    /// auto tries it on training views that are held back.
     #[arg(long, value_name = "0..3|auto", default_value = "0", value_parser = degree, help_heading = QUALITY)]
     sh_degree: Degree,
     /// Take lightness, too, from the photos of --colmap in another light.
     #[arg(long, requires = "output", help_heading = QUALITY, hide_short_help = true)]
     relight: bool,
-    /// Colored splat file to write [default: color.ply in the run folder].
+    /// Splat file to write [default: the run's color.ply].
     #[arg(short, long, value_name = "FILE.ply", help_heading = OUTPUT)]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -145,19 +160,19 @@ pub struct Colorize {
     #[arg(long, help_heading = OUTPUT)]
     json: bool,
     /// Solver: irls (reweighted least squares with L-BFGS) or adam (as the paper).
-    #[arg(long, value_parser = one_of(SOLVERS), default_value = "irls", help_heading = EXPERT, hide_short_help = true)]
+    #[arg(long, value_parser = one_of(SOLVERS), default_value = "irls", help_heading = EXPERT)]
     solver: SolverKind,
     /// Last iteration of --solver adam, counted from the start of fit [default: the preset's].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = EXPERT, hide_short_help = true)]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = EXPERT)]
     until: Option<u32>,
     /// Coarser scales of --solver adam beside the full one [default: 2].
-    #[arg(long, value_name = "0..4", value_parser = clap::value_parser!(u32).range(0..=4), help_heading = EXPERT, hide_short_help = true)]
+    #[arg(long, value_name = "0..4", value_parser = clap::value_parser!(u32).range(0..=4), help_heading = EXPERT)]
     scales: Option<u32>,
     /// Use all photos, even if they contradict their poses or COLMAP's points.
-    #[arg(long, help_heading = EXPERT, hide_short_help = true)]
+    #[arg(long, help_heading = EXPERT)]
     force: bool,
     /// Time every kernel and print a table.
-    #[arg(long, help_heading = EXPERT, hide_short_help = true)]
+    #[arg(long, help_heading = EXPERT)]
     timings: bool,
 }
 

@@ -22,16 +22,18 @@ const EFFECTS: &[(Effect, &str)] = &[
 /// Overrides of the plan's decisions.
 #[derive(Args, Clone)]
 pub struct EffectArguments {
-    /// Simulate an effect, whatever the plan decides; repeatable.
+    /// Model an effect, whatever the plan says; repeatable.
     ///
     /// lens: distortion. masks. exposure: changing exposure, flicker. robust: dust, scratches.
     /// antialias: views from near and far. background: sky. luma-degree: gloss (SH).
     #[arg(long, hide_possible_values = true, value_name = "EFFECT", value_parser = one_of(EFFECTS), help_heading = headings::EFFECTS)]
     with: Vec<Effect>,
-    /// Leave an effect out, whatever the plan decides; repeatable.
+    /// Leave an effect out; repeatable.
     #[arg(long, value_name = "EFFECT", value_parser = one_of(EFFECTS), hide_possible_values = true, help_heading = headings::EFFECTS)]
     without: Vec<Effect>,
-    /// Maximum SH degree of luma: how far it may change with the view [default: by the plan].
+    /// Maximum SH degree of luma [default: by the plan].
+    ///
+    /// How far luma may change with the view.
     #[arg(long, value_name = "0..3", value_parser = clap::value_parser!(u32).range(0..=3), help_heading = headings::QUALITY)]
     sh_degree: Option<u32>,
 }

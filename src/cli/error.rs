@@ -41,9 +41,7 @@ pub enum CliError {
         by_hand: Option<(String, PathBuf)>,
     },
     /// A network needs consent to its license, and standard input is no terminal.
-    #[error(
-        "{name} is given away under {license}: say --yes to fetch it where nobody can be asked"
-    )]
+    #[error("{name} is given away under {license}: give --yes to fetch it without a terminal")]
     NobodyToAsk {
         /// The network.
         name: String,

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{
     CliError,
-    headings::{INPUT, OUTPUT, TEACHER},
+    headings::{COMPARE, INPUT, MEASURES, OUTPUT, TEACHER},
     network::NetworkArguments,
     next, print,
     progress::Progress,
@@ -16,9 +16,6 @@ use crate::{
     eval::Peer,
     run::{EvalOptions, eval},
 };
-
-const COMPARE: &str = "Comparisons";
-const MEASURES: &str = "Measures";
 
 /// Ways of others to color a scene.
 const RECIPES: &[(Peer, &str)] = &[
@@ -37,47 +34,54 @@ const RECIPES: &[(Peer, &str)] = &[
     (Peer::ChromadistillRgb, "The code's in RGB, not CIELAB"),
 ];
 
-/// Measure a colored run: fidelity, colorfulness and consistency between views.
+/// Measure a colored run: fidelity, colorfulness, consistency.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma eval runs/house --teacher ddcolor-tiny --baselines
   gs-chroma eval runs/house --gray-frames gray/
-  gs-chroma eval runs/house --against film=colored/ --against brush=brush.ply")]
+  gs-chroma eval runs/house --against film=colored/ --against brush=b.ply")]
 pub struct Eval {
     /// Run folder [default: newest under runs/].
     run: Option<PathBuf>,
-    /// Measure this teacher's own pictures beside the scene, as for colorize.
-    #[arg(long, help_heading = TEACHER, value_name = "NAME|FILE.onnx|DIR|photos")]
+    /// Also measure this teacher's own pictures, as for colorize.
+    #[arg(long, help_heading = TEACHER, value_name = "TEACHER")]
     teacher: Option<PathBuf>,
     #[command(flatten)]
     network: NetworkArguments,
-    /// Also measure RGB splats fitted to the teacher, and coloring frame by frame.
+    /// Also measure RGB splats, and coloring frame by frame.
+    ///
+    /// The RGB splats are fitted to the teacher's pictures.
     #[arg(long, requires = "teacher", help_heading = COMPARE)]
     baselines: bool,
-    /// Also color the scene by ChromaDistill's recipe and measure that; repeatable.
-    #[arg(long, help_heading = COMPARE, value_parser = one_of(RECIPES), requires = "teacher")]
+    /// Also measure coloring by ChromaDistill's recipe; repeatable.
+    #[arg(long, hide_short_help = true, help_heading = COMPARE, value_parser = one_of(RECIPES), requires = "teacher")]
     recipe: Vec<Peer>,
-    /// Also measure another program's colored splats, or its colors of the path's frames; repeatable.
+    /// Also measure another program's splats or frames; repeatable.
     ///
-    /// Splats lie in COLMAP's frame. A folder holds a PNG or JPEG for each frame of
-    /// --gray-frames, of the same size and in the same order.
-    #[arg(long, help_heading = COMPARE, value_name = "NAME=FILE|DIR", value_parser = named)]
+    /// Splats lie in COLMAP's frame. A folder of colored frames of the path holds a PNG or JPEG for
+    /// each frame of --gray-frames, of the same size and in the same order.
+    #[arg(long, help_heading = COMPARE, value_name = "NAME=PATH", value_parser = named)]
     against: Vec<(String, PathBuf)>,
     /// Limit device memory for --baselines and --recipe, in MiB.
-    #[arg(long, help_heading = COMPARE, value_name = "MIB", value_parser = mebibytes(), requires = "teacher")]
+    #[arg(long, hide_short_help = true, help_heading = COMPARE, value_name = "MIB", value_parser = mebibytes(), requires = "teacher")]
     memory_limit: Option<u64>,
     /// Frames of the rendered path.
     #[arg(long, help_heading = MEASURES, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(2..=9999))]
     frames: u32,
-    /// Folder of optical flow between path frames [default: from depth and poses].
+    /// Folder of optical flow [default: from depth and poses].
     ///
-    /// Middlebury files for each pair and direction: 0000-0007.flo, 0007-0000.flo.
+    /// Between the path's frames: Middlebury files for each pair and direction: 0000-0007.flo,
+    /// 0007-0000.flo.
     #[arg(long, help_heading = MEASURES, value_name = "DIR")]
     flow: Option<PathBuf>,
-    /// Perceptual distance such as LPIPS: two inputs [1,3,H,W] in [-1,1], one number out.
+    /// Perceptual distance such as LPIPS.
+    ///
+    /// Two inputs [1,3,H,W] in [-1,1], one number out.
     #[arg(long, help_heading = MEASURES, value_name = "FILE.onnx")]
     lpips: Option<PathBuf>,
-    /// Count objects along the path: YOLOX, or another YOLO's decoded [1,N,5+classes] or [1,4+classes,N].
+    /// Count objects along the path: YOLOX or another YOLO.
+    ///
+    /// Decoded outputs of the latter: [1,N,5+classes] or [1,4+classes,N].
     #[arg(long, help_heading = MEASURES, value_name = "FILE.onnx")]
     detector: Option<PathBuf>,
     /// COLMAP folder, if it has moved since fit.

@@ -37,13 +37,13 @@ const VIEWERS: &[(ViewerChoice, &str)] = &[
 pub struct Export {
     /// Run folder or splat file [default: newest run under runs/].
     run: Option<PathBuf>,
-    /// File to write: .ply, .compressed.ply, .splat, .spz, .sog, .glb, .usda or .html.
+    /// File to write; its extension chooses the format.
     #[arg(short, long, value_name = "FILE", help_heading = OUTPUT)]
     output: PathBuf,
     /// Write the gray scene of a colored run.
     #[arg(long, help_heading = INPUT)]
     luma: bool,
-    /// Write COLMAP's coordinates, even if the scene was moved to the origin.
+    /// Write COLMAP's coordinates, even of a moved scene.
     #[arg(long, help_heading = OUTPUT)]
     colmap_coordinates: bool,
     /// Leave out Gaussians that no training view needs.
@@ -52,10 +52,12 @@ pub struct Export {
     /// Fit scales, opacities and colors to what this viewer draws.
     #[arg(long, help_heading = QUALITY, group = "before cameras", value_parser = one_of(VIEWERS))]
     viewer: Option<ViewerChoice>,
-    /// Keep opacities for viewers that antialias (Mip-Splatting), and mark the file so.
+    /// Keep opacities for viewers that antialias.
+    ///
+    /// By Mip-Splatting; the file is marked so.
     #[arg(long, help_heading = QUALITY, conflicts_with = "viewer")]
     antialiased: bool,
-    /// COLMAP folder with cameras for --clean and --viewer, of a splat file or a moved run.
+    /// COLMAP folder of splats or a moved run, for --clean and --viewer.
     #[arg(long, help_heading = INPUT, value_name = "COLMAP_DIR", requires = "before cameras")]
     colmap: Option<PathBuf>,
     /// Print what was written as JSON.

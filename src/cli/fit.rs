@@ -29,7 +29,7 @@ use crate::{
 /// Rows of the curve that is printed.
 const CURVE_ROWS: usize = 8;
 
-/// Train a gray scene, geometry and luminance, on photos with COLMAP poses.
+/// Train a gray scene, geometry and luminance, on photos with poses.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma plan house
@@ -39,8 +39,9 @@ const CURVE_ROWS: usize = 8;
 A finished run is trained further with its own photos and settings:
   gs-chroma fit runs/house --iterations 5000")]
 pub struct Fit {
-    /// COLMAP folder, one with transforms.json, a finished run to train further, or a block of a
-    /// job of `partition`.
+    /// COLMAP folder, one with transforms.json, a run to train further, or a block.
+    ///
+    /// Blocks are those of a job of `partition`.
     #[arg(value_name = "COLMAP_DIR|RUN|BLOCK")]
     colmap_dir: PathBuf,
     /// How much work to do [default: paper on a GPU, else draft].
@@ -50,17 +51,18 @@ pub struct Fit {
     ///
     /// --preset paper, all 15,000 iterations, --densify 3dgs, --sh-degree 3. With --iterations the
     /// same schedule in proportion.
-    #[arg(long, conflicts_with_all = ["preset", "densify", "stop_when_flat", "time_limit", "target_psnr"], help_heading = BUDGET)]
+    #[arg(long, conflicts_with_all = ["preset", "densify", "stop_when_flat", "time_limit", "target_psnr"], help_heading = EXPERT)]
     as_paper: bool,
-    /// Finish in this many minutes: chooses photo size, Gaussians and iterations.
+    /// Finish in this many minutes; chooses the settings.
     ///
-    /// With --preset, no more work than that. Counts everything from start to end.
+    /// They are photo size, Gaussians and iterations; with --preset, no more work than that. Counts
+    /// everything from start to end.
     #[arg(long, value_name = "MIN", value_parser = positive::<f64>, conflicts_with = "iterations", help_heading = BUDGET)]
     time_limit: Option<f64>,
-    /// Stop once held-out views reach this mean PSNR, in dB.
+    /// Stop once held-out views reach this PSNR, in dB.
     ///
-    /// Settles before it ends. At most the work of --preset [default: paper]; exit code 1 if the
-    /// target is out of reach.
+    /// Their mean counts. Settles before it ends. At most the work of --preset [default: paper];
+    /// exit code 1 if the target is out of reach.
     #[arg(long, value_name = "DB", value_parser = positive::<f64>, conflicts_with = "iterations", help_heading = BUDGET)]
     target_psnr: Option<f64>,
     #[command(flatten)]
@@ -86,14 +88,13 @@ pub struct Fit {
     #[arg(long, help_heading = OUTPUT)]
     json: bool,
     /// Time every kernel and print a table.
-    #[arg(long, help_heading = EXPERT, hide_short_help = true)]
+    #[arg(long, help_heading = EXPERT)]
     timings: bool,
     /// Start from the Gaussians of a splat file instead of COLMAP's points.
-    #[arg(long, value_name = "FILE.ply", help_heading = EXPERT, hide_short_help = true)]
+    #[arg(long, value_name = "FILE.ply", help_heading = EXPERT)]
     init: Option<PathBuf>,
-    /// Go on with a trained block of a job, with what its neighbors have around its cell in this
-    /// run of `merge`.
-    #[arg(long, value_name = "MERGED", help_heading = EXPERT, hide_short_help = true)]
+    /// Continue a trained block beside its neighbors in this run of `merge`.
+    #[arg(long, value_name = "MERGED", help_heading = EXPERT)]
     around: Option<PathBuf>,
 }
 
@@ -144,7 +145,7 @@ impl Fit {
             Some(run) => self.further(run, &load, &overrules)?,
             None if self.around.is_some() => refuse(
                 ErrorKind::ArgumentConflict,
-                "--around goes on with a trained block: train it first",
+                "--around continues a trained block: train it first",
             ),
             None => match FitRequest::of_block(&self.colmap_dir)? {
                 Some(block) => of_block(block, load, overrules),

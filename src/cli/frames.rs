@@ -43,11 +43,15 @@ pub(super) const CODECS: &[(Codec, &str)] = &[
 pub struct FramesCommand {
     /// Colored run folder [default: newest under runs/].
     run: Option<PathBuf>,
-    /// Folder for pictures, or a film (.mp4, .mov, .mkv, .m4v, .mxf) by FFmpeg.
+    /// Folder for pictures, or a film, by FFmpeg.
+    ///
+    /// Films are .mp4, .mov, .mkv, .m4v or .mxf.
     #[arg(short, long, help_heading = OUTPUT, value_name = "DIR|FILM", value_parser = folder_or_film())]
     output: PathBuf,
-    /// Teacher for what the scene does not show, such as sky [default: the run's teachers].
-    #[arg(long, help_heading = TEACHER, value_name = "NAME|FILE.onnx|DIR|photos")]
+    /// Teacher for what the scene does not show [default: the run's].
+    ///
+    /// Such as the sky.
+    #[arg(long, help_heading = TEACHER, value_name = "TEACHER")]
     teacher: Option<PathBuf>,
     #[command(flatten)]
     network: NetworkArguments,
@@ -59,12 +63,14 @@ pub struct FramesCommand {
     /// Write the teacher's own pictures, without the scene, for comparison.
     #[arg(long, help_heading = TEACHER)]
     teacher_alone: bool,
-    /// How films or pictures are coded [default: as the source, see docs/guides/old-film.md].
+    /// How films or pictures are coded [default: as the source].
+    ///
+    /// docs/guides/old-film.md lists what a source becomes.
     #[arg(long, help_heading = OUTPUT, value_name = "CODEC", value_parser = one_of(CODECS))]
     codec: Option<Codec>,
-    /// Frames per second of a film, such as 24000/1001 [default: the source's, or 24].
-    #[arg(long, help_heading = OUTPUT, value_name = "RATE", value_parser = rate)]
-    frame_rate: Option<Rate>,
+    /// Frames per second, such as 24000/1001 [default: the source's, or 24].
+    #[arg(long, alias = "frame-rate", help_heading = OUTPUT, value_name = "RATE", value_parser = rate)]
+    fps: Option<Rate>,
     /// COLMAP folder, if it has moved since fit.
     #[arg(long, help_heading = INPUT, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
@@ -85,7 +91,7 @@ impl FramesCommand {
             hints: self.hints,
             teacher_alone: self.teacher_alone,
             codec: self.codec,
-            frame_rate: self.frame_rate.map(|Rate(rate)| rate),
+            frame_rate: self.fps.map(|Rate(rate)| rate),
         }
     }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{CliError, info_page, next, print, progress::Progress};
-use crate::{report::Report, run::info};
+use crate::{report::Report, run::info, store::RunFolder};
 
 /// Describe a run, a splat file or a COLMAP folder.
 #[derive(Args)]
@@ -30,6 +30,8 @@ impl Info {
         let path = &self.path;
         let (page, next) = match serde_json::from_value::<Report>(found.clone()) {
             Ok(report) => {
+                let run = RunFolder::find(Some(path))?;
+                let path = run.path();
                 let next = match report.chroma.is_some() {
                     true => next::frames(path),
                     false => next::colorize(path),

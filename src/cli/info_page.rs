@@ -99,13 +99,7 @@ fn of_scene(page: &mut Page, report: &Report) {
     let luma = &report.luma;
     let held_out = luma.held_out.map_or_else(
         || "no photo was held out to measure it on".to_owned(),
-        |quality| {
-            format!(
-                "held-out photos: {}, SSIM {:.3}",
-                quality.psnr_in_words(),
-                quality.ssim
-            )
-        },
+        |quality| quality.in_words(),
     );
     let names = |on: bool| {
         let effects = report.effects.iter().filter(|effect| effect.on == on);
@@ -113,8 +107,8 @@ fn of_scene(page: &mut Page, report: &Report) {
         names.join(", ")
     };
     let effects = match (names(true), names(false)) {
-        (on, off) if on.is_empty() => format!("no effects simulated, of {off}"),
-        (on, _) => format!("effects simulated: {on}"),
+        (on, off) if on.is_empty() => format!("no effect modeled ({off})"),
+        (on, _) => format!("effects modeled: {on}"),
     };
     let lines = [
         format!(
@@ -151,10 +145,11 @@ fn of_colors(page: &mut Page, report: &Report) {
         0 => String::new(),
         count => format!(", {count} of them painted"),
     };
-    let unseen = chroma.unseen.map_or(String::new(), |unseen| {
-        let percent = 100.0 * unseen;
-        format!("; no colored photo shows {percent:.1} % of the Gaussians")
-    });
+    let percent = 100.0 * chroma.unseen.unwrap_or(0.0);
+    let unseen = match percent < 0.05 {
+        true => String::new(),
+        false => format!("; no colored photo shows {percent:.1} % of the Gaussians"),
+    };
     let truth = chroma.pictures.delta_e.map_or(String::new(), |error| {
         format!(
             "differ from the photos' own by ΔE00 {:.2} (95th percentile {:.1})",
@@ -176,7 +171,7 @@ fn of_colors(page: &mut Page, report: &Report) {
         truth,
         format!("colorfulness {:.1}{teacher}", chroma.pictures.colorfulness),
         format!(
-            "color.ply differs from what was solved for by ΔE00 {:.2}",
+            "color.ply differs from the solved colors by ΔE00 {:.2}",
             chroma.bake.mean
         ),
     ];

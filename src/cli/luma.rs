@@ -16,17 +16,20 @@ const RULES: &[(DensifyRules, &str)] = &[
 /// Overrides of the preset's settings.
 #[derive(Args)]
 pub(super) struct LumaArguments {
-    /// Number of iterations; turns early stopping off [default: the preset's].
+    /// Number of iterations [default: the preset's].
+    ///
+    /// Turns early stopping off.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = BUDGET)]
     iterations: Option<u32>,
     /// Maximum number of Gaussians [default: the preset's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = QUALITY)]
     max_splats: Option<u32>,
-    /// Rules of densification: own, or 3dgs as published (Kerbl et al. 2023) [default: own].
+    /// Rules of densification [default: own].
     ///
-    /// 3dgs: splits and clones by signed gradients, opacity resets, removal of large Gaussians, an SH
-    /// degree every 1,000 iterations, and its learning rates; without early stopping.
-    #[arg(long, value_parser = one_of(RULES), hide_possible_values = true, value_name = "own|3dgs", help_heading = EXPERT, hide_short_help = true)]
+    /// 3dgs: as published (Kerbl et al. 2023): splits and clones by signed gradients, opacity
+    /// resets, removal of large Gaussians, an SH degree every 1,000 iterations, and its learning
+    /// rates; without early stopping.
+    #[arg(long, value_parser = one_of(RULES), hide_possible_values = true, value_name = "own|3dgs", help_heading = EXPERT)]
     densify: Option<DensifyRules>,
     /// Leave black what no photo shows, instead of surrounding the scene with a shell of gray.
     #[arg(long, help_heading = QUALITY, hide_short_help = true)]
@@ -34,14 +37,14 @@ pub(super) struct LumaArguments {
     /// Start at COLMAP's points only, not also where photos match and it has none.
     #[arg(long, help_heading = QUALITY, hide_short_help = true)]
     no_fill_gaps: bool,
-    /// Limit device memory, in MiB; lowers the maximum of Gaussians if need be.
+    /// Limit device memory, in MiB, by fewer Gaussians.
     #[arg(long, value_name = "MIB", value_parser = mebibytes(), help_heading = BUDGET)]
     memory_limit: Option<u64>,
-    /// Early stopping: roll back to the best and end when twice the iterations would gain less than
-    /// this, in dB.
+    /// Stop early when twice the iterations would gain less, in dB.
     ///
-    /// 0.1 if no number follows [default: 0.3 with the preset balanced, 0.1 with paper, never with
-    /// draft, --iterations or --time-limit]. With --target-psnr only if the target is out of reach.
+    /// Training is rolled back to the best. 0.1 if no number follows [default: 0.3 with the preset
+    /// balanced, 0.1 with paper, never with draft, --iterations or --time-limit]. With
+    /// --target-psnr only if the target is out of reach.
     #[arg(long, value_name = "DB", num_args = 0..=1, require_equals = true, value_parser = positive::<f64>, help_heading = BUDGET, hide_short_help = true)]
     stop_when_flat: Option<Option<f64>>,
     /// Trade accuracy of training for time.
@@ -49,10 +52,10 @@ pub(super) struct LumaArguments {
     /// Keys: alpha-min=0.00001..0.1, transmittance-min=0..0.5, depth-bits=32|24|16,
     /// storage=full|half, ssim-window=11|7|5, adam=exact|lazy. Measures, renders and files always
     /// compute as viewers do.
-    #[arg(long, value_name = "KEY=VALUE[,…]", help_heading = EXPERT, hide_short_help = true)]
+    #[arg(long, value_name = "KEY=VALUE[,…]", help_heading = EXPERT)]
     numerics: Option<Numerics>,
     /// Random seed: the same seed gives the same bytes on the same machine [default: 0].
-    #[arg(long, value_name = "N", help_heading = EXPERT, hide_short_help = true)]
+    #[arg(long, value_name = "N", help_heading = EXPERT)]
     seed: Option<u64>,
 }
 

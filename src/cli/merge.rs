@@ -45,12 +45,12 @@ impl Merge {
 
 /// Views that show a border, and others.
 fn in_words(views: &SeamViews) -> String {
-    let of = |mean: &ViewMean| {
-        let psnr = mean.psnr.map(|psnr| format!(", {psnr:.2} dB"));
-        format!("{}{}", mean.views, psnr.unwrap_or_default())
+    let of = |mean: &ViewMean| match mean.psnr {
+        Some(psnr) => format!("{psnr:.1} dB ({} views)", mean.views),
+        None => "no view".to_owned(),
     };
     format!(
-        "held-out views across borders: {}; inside one block: {}",
+        "held-out PSNR across borders: {}; inside one block: {}",
         of(&views.across),
         of(&views.inside)
     )

@@ -12,6 +12,7 @@ mod eval;
 mod export;
 mod fit;
 mod frames;
+mod groups;
 mod headings;
 mod info;
 mod info_page;
@@ -40,7 +41,7 @@ mod view;
 
 use std::iter;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use answer::{AnswerError, answer};
 pub use error::CliError;
@@ -88,11 +89,26 @@ enum Command {
     Man(shell::ManPages),
 }
 
+/// The program with all its options.
+fn program() -> clap::Command {
+    let program = Cli::command().max_term_width(bar::WIDTH);
+    let program = program.mut_subcommands(|command| match command.get_name() {
+        "auto" => headings::in_order(&auto::Auto::for_experts(command)),
+        // Its options are those of its own commands.
+        "teacher" => command,
+        _ => headings::in_order(&command),
+    });
+    let template = groups::template(&program);
+    program.help_template(template)
+}
+
 impl Cli {
     /// The command in the program's arguments; ends the process where they are wrong.
     pub fn of_arguments() -> Self {
         let arguments = Invocation::present().arguments.iter().cloned();
-        Self::parse_from(iter::once("gs-chroma".into()).chain(arguments))
+        let words = iter::once("gs-chroma".into()).chain(arguments);
+        let matches = program().get_matches_from(words);
+        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
     }
 
     /// Runs the command and gives the exit status; what stops it is told in one line on standard
@@ -124,11 +140,11 @@ impl Cli {
             Command::Frames(command) => command.run(),
             Command::Eval(command) => command.run(),
             Command::Export(command) => command.run(),
-            Command::Tradeoff(command) => command.run(Self::command()),
+            Command::Tradeoff(command) => command.run(program()),
             Command::Info(command) => command.run(),
             Command::Doctor(command) => command.run(),
-            Command::Completions(command) => command.run(Self::command()),
-            Command::Man(command) => command.run(Self::command()),
+            Command::Completions(command) => command.run(program()),
+            Command::Man(command) => command.run(program()),
         }
     }
 }

@@ -30,7 +30,7 @@ pub struct NetworkArguments {
     /// Input size of a network that leaves it open, in pixels [default: the profile's].
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192), requires = "teacher", help_heading = TEACHER, hide_short_help = true)]
     teacher_size: Option<u32>,
-    /// Class that a network such as BigColor is asked with, of ImageNet's numbers [default: 0].
+    /// Class for a network such as BigColor, by ImageNet's numbers [default: 0].
     #[arg(long, value_name = "N", requires = "teacher", help_heading = TEACHER, hide_short_help = true)]
     teacher_class: Option<u16>,
     /// Processor on which the network runs.

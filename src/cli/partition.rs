@@ -15,7 +15,9 @@ use crate::{
     run::{PartitionOptions, partition},
 };
 
-/// Divide a large capture into blocks that are trained one by one, and put together by `merge`.
+/// Divide a large capture into blocks, to be trained one by one.
+///
+/// `merge` puts them together.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma partition survey -o job --blocks 4

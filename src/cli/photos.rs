@@ -35,14 +35,14 @@ const MASK_USES: &[(MaskUse, &str)] = &[
     ),
 ];
 
-/// Options of loading photos.
+/// What is taken from photos.
 #[derive(Args, Clone)]
-pub(super) struct Photos {
-    /// Shrink photos to this longer side, in pixels [default: the preset's].
+pub(super) struct PhotoArguments {
+    /// Photos' longer side in pixels [default: the preset's].
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..), help_heading = QUALITY)]
     max_side: Option<u32>,
     /// Train on all views; by default every 8th is held out for measuring.
-    #[arg(long, help_heading = EXPERT, hide_short_help = true)]
+    #[arg(long, help_heading = EXPERT)]
     no_holdout: bool,
     /// Channel of color photos that becomes gray.
     #[arg(long, value_parser = one_of(CHANNELS), default_value = "luma", help_heading = MASKS)]
@@ -63,20 +63,29 @@ pub(super) struct Photos {
         allow_hyphen_values = true
     )]
     normalize: Normalize,
-    /// Folder of masks, black where nothing counts [default: masks/ beside images/, else alpha].
+    /// Masked pixels: ignored, or trained as empty (black).
+    #[arg(long, value_parser = one_of(MASK_USES), default_value = "ignore", help_heading = MASKS, hide_short_help = true)]
+    masked: MaskUse,
+}
+
+/// Options of loading photos.
+#[derive(Args, Clone)]
+pub(super) struct Photos {
+    #[command(flatten)]
+    photos: PhotoArguments,
+    /// Folder of masks, black where nothing counts [default: masks/, else alpha].
     ///
-    /// The mask of the photo b.jpg is b.jpg.png or b.png. alpha takes the photos' transparency.
+    /// By default beside images/. The mask of the photo b.jpg is b.jpg.png or b.png. alpha takes
+    /// the photos' transparency.
     #[arg(long, value_name = "DIR|alpha|off", help_heading = MASKS)]
     masks: Option<String>,
-    /// Masked pixels: ignored, or trained as empty (black).
-    #[arg(long, value_parser = one_of(MASK_USES), default_value = "ignore", help_heading = MASKS)]
-    masked: MaskUse,
     /// Use all photos, even if they contradict their poses or COLMAP's points.
-    #[arg(long, help_heading = EXPERT, hide_short_help = true)]
+    #[arg(long, help_heading = EXPERT)]
     force: bool,
 }
 
-impl Photos {
+impl PhotoArguments {
+    /// Options with masks by default.
     pub(super) fn options(self) -> LoadOptions {
         LoadOptions {
             max_side: self.max_side,
@@ -84,12 +93,20 @@ impl Photos {
             channel: self.channel,
             encoding: self.encoding,
             normalize: self.normalize,
+            masked: self.masked,
+            ..LoadOptions::default()
+        }
+    }
+}
+
+impl Photos {
+    pub(super) fn options(self) -> LoadOptions {
+        LoadOptions {
             masks: self
                 .masks
                 .map_or_else(MaskSource::default, MaskSource::from),
-            masked: self.masked,
             force: self.force,
-            ..LoadOptions::default()
+            ..self.photos.options()
         }
     }
 }

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::run::{PlanOptions, PlanReport, Preset, plan};
 
-/// List the effects your photos need, with the evidence, without training.
+/// List the effects your photos need, without training.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma plan house

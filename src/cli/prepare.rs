@@ -6,7 +6,7 @@ use clap::{Args, builder::PossibleValuesParser, error::ErrorKind};
 
 use super::{
     CliError,
-    headings::{INPUT, MASKS, OUTPUT},
+    headings::{CAMERA, INPUT, MASKS, OUTPUT},
     next, print,
     progress::Progress,
     usage::refuse,
@@ -14,9 +14,6 @@ use super::{
 };
 use crate::capture::lens::MODELS;
 use crate::prepare::{CameraMotion, Cameras, Matching, PrepareOptions, Prepared, prepare};
-
-/// Options on cameras and their poses.
-const CAMERA: &str = "Cameras and poses";
 
 const CAMERAS: &[(Cameras, &str)] = &[
     (Cameras::One, "One camera with one lens for all"),
@@ -47,7 +44,9 @@ const MATCHINGS: &[(Matching, &str)] = &[
 /// Input of `prepare` and its options.
 #[derive(Args)]
 pub struct InputArguments {
-    /// A film, numbered pictures (a folder of DPX or EXR, or scan_%06d.tif), or a folder of photos.
+    /// A film, numbered pictures, or a folder of photos.
+    ///
+    /// Numbered pictures are a folder of DPX or EXR, or scan_%06d.tif.
     #[arg(value_name = "FILM|DIR")]
     input: PathBuf,
     /// Start of the shot in the film, such as 65 or 1:05.
@@ -62,20 +61,24 @@ pub struct InputArguments {
     /// Number of the shot, from 1, instead of --start.
     #[arg(long, help_heading = INPUT, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), conflicts_with = "start")]
     shot: Option<u16>,
-    /// Frames per second of numbered pictures, such as 16 or 24000/1001 [default: their own, or 24].
+    /// Frames per second of numbered pictures [default: their own, or 24].
     ///
-    /// With it a folder of numbered TIFF, PNG or JPEG is a film.
-    #[arg(long, help_heading = INPUT, value_name = "RATE", value_parser = rate, hide_short_help = true)]
-    frame_rate: Option<Rate>,
-    /// Frames per second that get a pose, the sharpest of their time [default: 2, 30 to 120 in all].
-    #[arg(long, help_heading = INPUT, value_name = "N", value_parser = positive::<f64>)]
-    per_second: Option<f64>,
-    /// One mask for all photos, black where nothing counts; black borders are masked anyway.
+    /// Such as 16 or 24000/1001. With it a folder of numbered TIFF, PNG or JPEG is a film.
+    #[arg(long, alias = "frame-rate", help_heading = INPUT, value_name = "RATE", value_parser = rate, hide_short_help = true)]
+    fps: Option<Rate>,
+    /// Frames per second that get a pose [default: 2].
+    ///
+    /// The sharpest of their time; by default 30 to 120 in all.
+    #[arg(long, alias = "per-second", help_heading = INPUT, value_name = "N", value_parser = positive::<f64>)]
+    pose_fps: Option<f64>,
+    /// One mask for all photos, black where nothing counts.
+    ///
+    /// Black borders of a film are masked anyway.
     #[arg(long, value_name = "FILE.png", help_heading = MASKS)]
     mask: Option<PathBuf>,
-    /// Folder of masks for single photos, named like the photos.
+    /// Folder of masks, named like the photos.
     ///
-    /// The mask of 000001.png is 000001.png.png or 000001.png.
+    /// Black where nothing counts. The mask of 000001.png is 000001.png.png or 000001.png.
     #[arg(long, value_name = "DIR", help_heading = MASKS)]
     masks: Option<PathBuf>,
     /// Which photos share a camera [default: by input].
@@ -83,16 +86,18 @@ pub struct InputArguments {
     /// By default one for a film, folder for photos of one size, else photo.
     #[arg(long, help_heading = CAMERA, value_name = "WHICH", value_parser = one_of(CAMERAS))]
     cameras: Option<Cameras>,
-    /// COLMAP's camera model: OPENCV for visible distortion, OPENCV_FISHEYE for a fisheye.
+    /// COLMAP's camera model.
+    ///
+    /// OPENCV for visible distortion, OPENCV_FISHEYE for a fisheye.
     #[arg(long, help_heading = CAMERA, value_name = "MODEL", default_value = "SIMPLE_RADIAL", hide_possible_values = true, value_parser = PossibleValuesParser::new(MODELS.map(|model| model.name)))]
     lens: String,
     /// How the camera moved [default: found out from the matches].
-    #[arg(long, help_heading = CAMERA, value_name = "HOW", value_parser = one_of(MOTIONS))]
+    #[arg(long, hide_short_help = true, help_heading = CAMERA, value_name = "HOW", value_parser = one_of(MOTIONS))]
     camera: Option<CameraMotion>,
     /// How photos are matched [default: sequential for films and more than 200 photos].
     #[arg(long = "match", hide_short_help = true, help_heading = CAMERA, value_name = "HOW", value_parser = one_of(MATCHINGS))]
     matching: Option<Matching>,
-    /// If COLMAP is missing, install pycolmap into the cache folder.
+    /// Install pycolmap into the cache if COLMAP is missing.
     #[arg(long, help_heading = CAMERA)]
     install: bool,
 }
@@ -116,8 +121,8 @@ impl InputArguments {
             end: self.end.or(length.map(|(start, seconds)| start + seconds)),
             shot: self.shot.map(usize::from),
             known_shots: None,
-            frame_rate: self.frame_rate.map(|Rate(rate)| rate),
-            per_second: self.per_second,
+            frame_rate: self.fps.map(|Rate(rate)| rate),
+            per_second: self.pose_fps,
             mask: self.mask,
             masks: self.masks,
             cameras: self.cameras,
@@ -130,15 +135,16 @@ impl InputArguments {
     }
 }
 
-/// Find camera poses: from a film or photos to the COLMAP folder that fit takes.
+/// Find the camera poses of photos or a film, for fit.
 ///
-/// Runs FFmpeg and COLMAP: frames of one shot, masks of black borders, poses. The same command
-/// continues after an interruption, and redoes only what its options or your photos have changed.
+/// Writes a COLMAP folder. Runs FFmpeg and COLMAP: frames of one shot, masks of black borders,
+/// poses. The same command continues after an interruption, and redoes only what its options or
+/// your photos have changed.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma prepare photos/ -o house
   gs-chroma prepare film.mp4 -o house --start 1:05 --seconds 20
-  gs-chroma prepare scan/ -o house --frame-rate 16
+  gs-chroma prepare scan/ -o house --fps 16
   gs-chroma prepare photos/ -o house --lens OPENCV_FISHEYE --cameras one")]
 pub struct Prepare {
     #[command(flatten)]

@@ -202,6 +202,11 @@ fn of_capture(error: &CaptureError) -> String {
             "{}: has {depth} a channel, values from 0 to {white}: none lies within --normalize {low},{high}",
             path.display()
         ),
+        CaptureError::NoFolder { .. }
+        | CaptureError::NoImagesFolder { .. }
+        | CaptureError::NoModel { .. } => format!(
+            "{error}; photos or a film without poses go through `gs-chroma prepare` or `gs-chroma auto` first"
+        ),
         CaptureError::MixedDepths { .. } => format!("{error}, or give --normalize off"),
         CaptureError::NoMaskFolder { .. } => {
             format!("{error}; name another with --masks, or leave it out")

@@ -6,7 +6,7 @@ use clap::{Args, error::ErrorKind};
 
 use super::{
     CliError,
-    headings::{INPUT, OUTPUT},
+    headings::{INPUT, OUTPUT, PATH},
     next, print,
     progress::Progress,
     usage::refuse,
@@ -23,15 +23,15 @@ const VIEWS: &[(Views, &str)] = &[
     (Views::All, "All"),
 ];
 
-/// Render a scene at the photographed viewpoints, or along a camera path.
+/// Render a scene from the photos' viewpoints or along a path.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma render runs/house --views test -o renders/
   gs-chroma render runs/house --path orbit --video house.mp4")]
 pub struct Render {
-    /// Run folder, or a splat file with --colmap or --path [default: newest under runs/].
+    /// Run folder, or splats with --colmap or --path [default: newest under runs/].
     run: Option<PathBuf>,
-    /// COLMAP folder: of a splat file, or of a run if it has moved since fit.
+    /// COLMAP folder of the splats, or of a moved run.
     #[arg(long, help_heading = INPUT, value_name = "COLMAP_DIR")]
     colmap: Option<PathBuf>,
     /// Which views [default: held-out ones, or all where none is held out].
@@ -48,13 +48,13 @@ pub struct Render {
 }
 
 #[derive(Args)]
-#[command(next_help_heading = "Along a path")]
+#[command(next_help_heading = PATH)]
 struct PathArguments {
-    /// Camera path: around the scene, through the photos' viewpoints, or from a file.
+    /// Camera path: orbit, photos (their viewpoints) or FILE.json.
     ///
     /// Files: nerfstudio's camera_path.json, transforms.json, 3DGS's cameras.json, SuperSplat's
     /// document.json or settings.json.
-    #[arg(long, value_name = "orbit|photos|FILE.json", value_parser = way)]
+    #[arg(long, value_name = "PATH", value_parser = way)]
     path: Option<PathShape>,
     /// Film to write (.mp4, .mov, .mkv, .m4v), by FFmpeg.
     #[arg(long, value_name = "FILM", requires = "path", value_parser = film)]
@@ -71,7 +71,9 @@ struct PathArguments {
     /// Show the gray scene left of the colored one.
     #[arg(long, requires = "path", conflicts_with = "luma")]
     side_by_side: bool,
-    /// Write the path as nerfstudio's camera_path.json, in COLMAP's coordinates.
+    /// Write the path as nerfstudio's camera_path.json.
+    ///
+    /// In COLMAP's coordinates.
     #[arg(long, value_name = "FILE.json", requires = "path")]
     save_path: Option<PathBuf>,
 }

@@ -12,7 +12,7 @@ use crate::{disk, store::files};
 /// Print a completion script for a shell.
 #[derive(Args)]
 #[command(after_long_help = "Example:
-  gs-chroma completions bash > ~/.local/share/bash-completion/completions/gs-chroma")]
+  gs-chroma completions bash >> ~/.bash_completion")]
 pub struct Completions {
     /// Shell to complete in.
     shell: Shell,

@@ -65,7 +65,7 @@ struct Fetch {
 
 /// Test a network on a ramp and a photo, and show how it is understood.
 ///
-/// If nothing tells what its numbers mean, the usual conventions are tried and the most plausible
+/// If it is not known what its numbers mean, the usual conventions are tried and the most plausible
 /// is taken. colorize follows it only if a manifest states it.
 #[derive(Args)]
 struct Check {
@@ -139,8 +139,8 @@ fn lines(checkup: &Checkup) -> Vec<String> {
     let by = match checkup.told_by {
         ProfileSource::User => "as --teacher-profile says",
         ProfileSource::Manifest => "as the manifest beside it says",
-        ProfileSource::Catalog => "as its SHA-256 tells",
-        ProfileSource::Shapes => "as inputs and outputs tell",
+        ProfileSource::Catalog => "by its SHA-256",
+        ProfileSource::Shapes => "by its inputs and outputs",
         ProfileSource::Trial => "a guess, from answers to what was tried",
     };
     let known = checkup.known_as.as_ref();

@@ -20,13 +20,13 @@ use crate::{
 /// Measure quality against time on your own photos and device.
 ///
 /// The first fit, and colorize with --teacher, already show what less time costs; then one setting
-/// at a time is changed, what tells most for its seconds first. The same command continues after an
+/// at a time is changed, the most useful first. The same command continues after an
 /// interruption.
 #[derive(Args)]
 #[command(after_long_help = "Example:
   gs-chroma tradeoff house
   gs-chroma tradeoff house --preset balanced -- --max-side 800 --masks off
-  gs-chroma tradeoff house --teacher ddcolor-tiny --knobs iterations,max-side,rounds --budget 60")]
+  gs-chroma tradeoff house --teacher ddcolor-tiny --knobs rounds --budget 60")]
 pub struct Tradeoff {
     /// COLMAP folder with images/ and sparse/, or one with transforms.json.
     colmap_dir: PathBuf,
@@ -34,13 +34,15 @@ pub struct Tradeoff {
     #[arg(short, long, help_heading = OUTPUT, value_name = "DIR", value_parser = folder())]
     output: Option<PathBuf>,
     /// Network or folder of colored photos, for points in color.
-    #[arg(long, help_heading = TEACHER, value_name = "NAME|FILE.onnx|DIR")]
+    #[arg(long, help_heading = TEACHER, value_name = "TEACHER")]
     teacher: Option<PathBuf>,
     /// Preset around which settings change [default: paper on a GPU, else draft].
     #[arg(long, value_parser = one_of(PRESETS), help_heading = BUDGET)]
     preset: Option<Preset>,
-    /// Minutes for all points together, earlier starts included [default: four times the base's].
-    #[arg(long, help_heading = BUDGET, value_name = "MINUTES", value_parser = positive::<f64>)]
+    /// Minutes for all points together [default: four times the base's].
+    ///
+    /// Earlier starts included.
+    #[arg(long, help_heading = BUDGET, value_name = "MIN", value_parser = positive::<f64>)]
     budget: Option<f64>,
     /// Settings to change [default: all].
     #[arg(long, help_heading = BUDGET, value_name = "A,B,…", value_delimiter = ',', value_parser = PossibleValuesParser::new(knob_names()))]

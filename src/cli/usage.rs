@@ -1,13 +1,12 @@
 //! Commands that were called wrongly: exit status 2, with the usage of the command in question.
 
-use clap::{Command, CommandFactory, error::ErrorKind};
+use clap::{Command, error::ErrorKind};
 
-use super::Cli;
 use crate::invocation::Invocation;
 
 /// The command that was called, as the program's first argument names it.
 pub(super) fn called() -> Command {
-    let mut program = Cli::command();
+    let mut program = super::program();
     // Subcommands learn the program's name.
     program.build();
     let name = Invocation::present().arguments.first();

@@ -97,10 +97,10 @@ impl Effect {
     /// Unit of the evidence.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::Lens => "pixels that the lens displaces",
+            Self::Lens => "pixels of lens distortion",
             Self::Masks => "% of pixels masked",
             Self::Exposure => "gray levels between views",
-            Self::Robust => "% of places disagree",
+            Self::Robust => "% of places that differ",
             Self::Antialias => "times finer from near than from far",
             Self::Background => "% of the photos far behind all points",
             Self::LumaDegree => "gray levels by direction",

@@ -36,7 +36,6 @@ fn every_effect_of_stage_1_is_decided_once() {
     let plan = plan(3, &Overrules::default());
     let order: Vec<Effect> = plan.decisions.iter().map(|d| d.effect).collect();
     assert_eq!(order, Effect::ALL);
-    assert_eq!(plan.to_string().lines().count(), Effect::ALL.len());
 }
 
 #[test]
@@ -117,11 +116,6 @@ fn a_trial_decides_where_the_evidence_is_in_doubt() {
     assert!((behind(1.5).after(&Trials::from([(Effect::Background, 0.11)]))).on);
     let of_another = Trials::from([(Effect::Background, 0.3)]);
     assert_eq!(exposure(5.0).after(&of_another), exposure(5.0));
-    let row = exposure(5.0).after(&tried(-2.0)).to_string();
-    assert!(
-        row.ends_with("but a trial loses 2 dB with it; 0.3 would count"),
-        "{row}"
-    );
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Decisions in words: a line an effect, with its figure, its threshold and the reason.
+//! Decisions in words: a table with a row for each effect, and reasons below it.
 
 use std::fmt;
 
@@ -14,80 +14,65 @@ fn number(value: f64) -> String {
     }
 }
 
-impl Effect {
-    /// The evidence and its threshold, in words.
-    fn found(self, figure: f64, threshold: f64) -> String {
-        let (x, least) = (number(figure), number(threshold));
-        let (found, count) = match self {
-            Self::Lens => (format!("the lens moves pixels by {x}"), "be visible"),
-            Self::Masks => return format!("{x} % of the pixels are masked"),
-            Self::Exposure => (format!("photos differ by {x} gray levels"), "be visible"),
-            Self::Robust => (format!("{x} % of places differ in one photo"), "matter"),
-            Self::Antialias => (format!("near views are {x} times finer"), "matter"),
-            Self::Background => (format!("{x} % of the photos lie far behind"), "matter"),
-            Self::LumaDegree => (format!("direction changes {x} gray levels"), "matter"),
-            Self::TeacherCorrection => (format!("views differ by {x} CIELAB units"), "be visible"),
-            Self::ChromaDegree => (format!("views held back gain {x} %"), "be worth it"),
-        };
-        format!("{found}; {least} would {count}")
+/// Heads of the columns; the first and the last begin at the left.
+const HEAD: [&str; 5] = ["effect", "use", "measured", "threshold", "unit"];
+
+impl Decision {
+    /// Cells of its row.
+    fn cells(&self) -> [String; 5] {
+        let use_it = if self.on { "on" } else { "off" };
+        let figure = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), number);
+        [
+            self.effect.to_string(),
+            use_it.to_owned(),
+            figure(self.evidence),
+            figure(self.evidence.map(|_| self.threshold)),
+            self.effect.unit().to_owned(),
+        ]
     }
 
-    /// Text for missing evidence.
-    fn unknown(self) -> &'static str {
-        match self {
-            Self::Masks => "no photo has a mask",
-            Self::ChromaDegree => "not tried; an automatic SH degree is",
-            _ => "no point that several photos show tells",
-        }
-    }
-}
-
-impl fmt::Display for Decision {
-    /// A line of the table that a user sees.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let found = match self.evidence {
-            Some(figure) => self.effect.found(figure, self.threshold),
-            None => self.effect.unknown().to_owned(),
+    /// Reasons that the row does not show, if any.
+    fn reasons(&self) -> Option<String> {
+        let unknown = match (self.evidence, self.effect) {
+            (Some(_), _) | (None, Effect::Masks) => None,
+            (None, Effect::ChromaDegree) => Some("tried only for an automatic SH degree".to_owned()),
+            (None, _) => Some("no photos share a point".to_owned()),
         };
-        let on = if self.on { "on" } else { "off" };
-        write!(f, "{:<18} {on:<3} {found}", self.effect.to_string())?;
-        match (self.decided_by, self.effect) {
-            (Decider::Evidence, _) => Ok(()),
+        let decider = match (self.decided_by, self.effect) {
+            // The degree is off unless it is tried, which is said.
+            (Decider::Evidence, _) | (Decider::Preset, Effect::ChromaDegree) => None,
             (Decider::Trial, Effect::TeacherCorrection) => {
-                f.write_str(", but corrected they would differ more")
+                Some("corrected views would differ more".to_owned())
             }
             (Decider::Trial, _) => {
-                f.write_str(&tried(self.trial.unwrap_or(0.0), self.effect.trial_gain()))
+                let gain = self.trial.unwrap_or(0.0);
+                let how = if gain < 0.0 { "loses" } else { "gains" };
+                let [gain, least] = [gain.abs(), self.effect.trial_gain()].map(number);
+                Some(format!("a trial {how} {gain} dB with it; {least} needed"))
             }
-            (Decider::User, _) => f.write_str("; set by you"),
+            (Decider::User, _) => Some("set by you".to_owned()),
             (Decider::Preset, Effect::Robust) => {
-                write!(f, "; a run of {ROBUST_ITERATIONS} iterations could tell")
+                Some(format!("needs {ROBUST_ITERATIONS} iterations"))
             }
-            (Decider::Preset, Effect::Antialias) => {
-                f.write_str("; a longer run could try what viewers make of it")
-            }
-            // Said already, or what is always done.
-            (Decider::Preset, Effect::ChromaDegree) => Ok(()),
-            (Decider::Preset, _) => f.write_str("; the preset decides"),
-        }
+            (Decider::Preset, Effect::Antialias) => Some("longer runs try it".to_owned()),
+            (Decider::Preset, _) => Some("set by the preset".to_owned()),
+        };
+        let reasons: Vec<String> = unknown.into_iter().chain(decider).collect();
+        (!reasons.is_empty()).then(|| format!("{}: {}", self.effect, reasons.join("; ")))
     }
 }
 
-/// Result of a trial in words; gains in dB.
-fn tried(gain: f64, least: f64) -> String {
-    let (how, but) = match gain < least {
-        true if gain < 0.0 => ("loses", "but"),
-        true => ("gains", "but"),
-        false => ("gains", "and"),
-    };
-    let (gain, least) = (number(gain.abs()), number(least));
-    format!(", {but} a trial {how} {gain} dB with it; {least} would count")
-}
-
-/// The table of some decisions.
+/// The table of some decisions, and the reasons of those that it does not explain.
 pub fn table(decisions: &[Decision]) -> String {
-    let rows: Vec<String> = decisions.iter().map(Decision::to_string).collect();
-    rows.join("\n")
+    let mut rows = vec![HEAD.map(str::to_owned)];
+    rows.extend(decisions.iter().map(Decision::cells));
+    let name = rows.iter().map(|[name, ..]| name.len()).max().unwrap_or(0);
+    let line = |[effect, use_it, measured, threshold, unit]: &[String; 5]| {
+        format!("{effect:name$}  {use_it:<3}  {measured:>8}  {threshold:>9}  {unit}")
+    };
+    let lines = rows.iter().map(line);
+    let lines = lines.chain(decisions.iter().filter_map(Decision::reasons));
+    lines.collect::<Vec<_>>().join("\n")
 }
 
 impl fmt::Display for Plan {
@@ -101,24 +86,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_has_figure_threshold_and_reason() {
+    fn a_table_has_figures_thresholds_and_reasons() {
         let exposure = Decision::new(Effect::Exposure, Some(6.7), 2.0);
-        assert_eq!(
-            exposure.to_string(),
-            "exposure           on  photos differ by 6.7 gray levels; 2 would be visible"
-        );
-        let asked = Decision {
+        let tried = Decision {
             on: false,
+            decided_by: Decider::Trial,
+            trial: Some(-2.0),
+            ..exposure.clone()
+        };
+        let asked = Decision {
             decided_by: Decider::User,
-            ..exposure
+            ..Decision::new(Effect::Masks, None, 0.0)
         };
         assert_eq!(
-            asked.to_string(),
-            "exposure           off photos differ by 6.7 gray levels; 2 would be visible; set by you"
-        );
-        assert_eq!(
-            Decision::new(Effect::Masks, None, 0.0).to_string(),
-            "masks              off no photo has a mask"
+            table(&[exposure, tried, asked]),
+            "effect    use  measured  threshold  unit\n\
+             exposure  on        6.7          2  gray levels between views\n\
+             exposure  off       6.7          2  gray levels between views\n\
+             masks     off         –          –  % of pixels masked\n\
+             exposure: a trial loses 2 dB with it; 0.3 needed\n\
+             masks: set by you"
         );
     }
 
@@ -129,12 +116,14 @@ mod tests {
     }
 
     #[test]
-    fn lines_that_the_evidence_decides_fit_a_terminal() {
-        let effects = [Effect::TeacherCorrection, Effect::ChromaDegree];
-        for effect in Effect::ALL.into_iter().chain(effects) {
+    fn tables_fit_a_terminal() {
+        let of_colors = [Effect::TeacherCorrection, Effect::ChromaDegree];
+        for effects in [&Effect::ALL[..], &of_colors] {
             for evidence in [Some(12.34), Some(100.0), None] {
-                let line = Decision::new(effect, evidence, 0.65).to_string();
-                assert!(line.len() <= 80, "{line}");
+                let decided = |&effect: &Effect| Decision::new(effect, evidence, 0.65);
+                let table = table(&effects.iter().map(decided).collect::<Vec<_>>());
+                let widest = table.lines().map(|line| line.chars().count()).max();
+                assert!(widest <= Some(80), "{table}");
             }
         }
     }

@@ -295,6 +295,10 @@ impl Task<'_> {
         if unplaced.len() as f64 > USUAL * self.photos.headers.len() as f64 {
             let alone = unplaced.iter().filter(|name| !elsewhere.contains(**name));
             let alone = alone.count();
+            let apart = match unplaced.len() - alone {
+                0 => String::new(),
+                apart => format!("{apart} are in other pieces, "),
+            };
             let names = unplaced.iter().take(TOLD_NAMES);
             let names: Vec<&str> = names.map(|name| name.as_str()).collect();
             let more = if unplaced.len() > TOLD_NAMES {
@@ -303,11 +307,10 @@ impl Task<'_> {
                 ""
             };
             observe(Event::Warning(format!(
-                "{} of {} photos have no pose ({}{more}): {} are in other pieces, {alone} have too few matches with any; {}",
+                "{} of {} photos have no pose ({}{more}): {apart}{alone} have too few matches with any; {}",
                 unplaced.len(),
                 self.photos.headers.len(),
                 names.join(", "),
-                unplaced.len() - alone,
                 self.remedies()
             )));
         }

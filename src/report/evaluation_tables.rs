@@ -69,7 +69,7 @@ impl Evaluation {
             _ => "training",
         };
         let mut notes = vec![
-            "PSNR in dB; corrected: of luma after each photo's own gain and offset; a/b error: root mean square in CIELAB units, lightness taken from the photo."
+            "PSNR in dB; corrected: exposure-corrected, after each photo's own gain and offset; a/b error: root mean square in CIELAB units, lightness taken from the photo."
                 .to_owned(),
             "Colors: effective number of a/b squares five units wide; sharp: variance of the Laplacian of the gray picture, 0 to 255."
                 .to_owned(),

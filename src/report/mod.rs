@@ -33,6 +33,7 @@ use crate::{
     luma::{CurvePoint, Goal, LumaSettings, Preset},
 };
 use chroma::number_or_nan;
+use table::figure;
 
 /// Version of the report's layout; raised when a key changes its meaning.
 pub const REPORT_VERSION: u32 = 2;
@@ -322,16 +323,28 @@ impl LumaQuality {
         self.corrected_psnr.unwrap_or(self.psnr)
     }
 
-    /// All kinds of PSNR, in words.
-    pub fn psnr_in_words(&self) -> String {
-        let corrected = self.corrected_psnr.map_or(String::new(), |psnr| {
-            format!(" ({psnr:.2} dB after each photo's own gain and offset)")
-        });
-        let plain = self.plain_psnr.map_or(String::new(), |psnr| {
-            format!(", exported to viewers without antialiasing {psnr:.2} dB")
-        });
-        format!("PSNR {:.2} dB{corrected}{plain}", self.psnr)
+    /// Quality on held-out views, in words.
+    pub fn in_words(&self) -> String {
+        let kinds = [Some(self.psnr), self.corrected_psnr, self.plain_psnr];
+        format!(
+            "{}, SSIM {:.3}",
+            psnr_in_words("held-out", kinds),
+            self.ssim
+        )
     }
+}
+
+/// PSNR of some views in dB, in words: as shown, exposure-corrected, and in viewers without
+/// antialiasing.
+pub(crate) fn psnr_in_words(views: &str, [shown, corrected, plain]: [Option<f64>; 3]) -> String {
+    let corrected = corrected.map(|psnr| format!(" ({psnr:.1} exposure-corrected)"));
+    let plain = plain.map(|psnr| format!(", {psnr:.1} dB in viewers without antialiasing"));
+    format!(
+        "{views} PSNR {} dB{}{}",
+        figure(shown, 1),
+        corrected.unwrap_or_default(),
+        plain.unwrap_or_default()
+    )
 }
 
 /// Exposure of one photo.
@@ -371,13 +384,9 @@ impl Report {
     /// Stage 1 on one line.
     pub fn luma_summary(&self) -> String {
         let luma = &self.luma;
-        let quality = luma.held_out.map_or(String::new(), |quality| {
-            format!(
-                ", held-out {}, SSIM {:.3}",
-                quality.psnr_in_words(),
-                quality.ssim
-            )
-        });
+        let quality = luma
+            .held_out
+            .map_or(String::new(), |quality| format!(", {}", quality.in_words()));
         let given_up = luma.given_up.map_or(String::new(), |iteration| {
             format!(" (stopped at {iteration}, rolled back to the best)")
         });

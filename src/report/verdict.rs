@@ -1,6 +1,6 @@
 //! Verdict on an evaluation, in words that follow from its figures.
 
-use super::{ConsistencyScore, Evaluation, Method, PictureScore};
+use super::{ConsistencyScore, Evaluation, Method, PictureScore, psnr_in_words};
 
 /// Ratios between these are no difference worth a word: other views would give as much.
 const ALIKE: [f64; 2] = [0.9, 1.1];
@@ -14,7 +14,7 @@ const TIMES: f64 = 1.5;
 /// Colorfulness below which it rounds to nothing.
 const COLORLESS: f64 = 0.05;
 
-/// ΔE00 below which nobody sees a difference, and below which one has to look for it.
+/// ΔE00 below which is invisible a difference, and below which is hard to see it.
 const UNSEEN: f64 = 1.0;
 const FAINT: f64 = 2.0;
 
@@ -144,8 +144,8 @@ impl Evaluation {
     fn export(&self) -> Option<String> {
         let change = self.bake?.mean;
         let how = match () {
-            () if change < UNSEEN => "which nobody sees",
-            () if change < FAINT => "which one has to look for",
+            () if change < UNSEEN => "which is invisible",
+            () if change < FAINT => "which is hard to see",
             () => "which is visible",
         };
         Some(format!(
@@ -158,23 +158,15 @@ impl Evaluation {
         let luma = &self.luma;
         let sharp = luma.sharpness / luma.photo_sharpness;
         let sharp = match sharp.is_finite() {
-            true => format!(" and {:.0} % of their sharpness", 100.0 * sharp),
+            true => format!(", {:.0} % of the photos' sharpness", 100.0 * sharp),
             false => String::new(),
         };
-        let which = match &self.measured_on[..] {
-            "test" => "photos that were held out",
-            _ => "the photos it was trained on",
+        let views = match &self.measured_on[..] {
+            "test" => "held-out",
+            _ => "training",
         };
-        let corrected = luma.corrected_psnr.map_or(String::new(), |psnr| {
-            format!(" ({psnr:.1} dB after each photo's own gain and offset)")
-        });
-        let plain = luma.plain_psnr.map_or(String::new(), |psnr| {
-            format!("; the exported file, in viewers without antialiasing, with {psnr:.1} dB")
-        });
-        format!(
-            "the gray scene shows {which} with {:.1} dB{corrected}{sharp}{plain}",
-            luma.psnr
-        )
+        let kinds = [Some(luma.psnr), luma.corrected_psnr, luma.plain_psnr];
+        format!("gray scene: {}{sharp}", psnr_in_words(views, kinds))
     }
 }
 

@@ -160,7 +160,7 @@ fn trained(folder: &Path, job: &Job, observe: &mut Observer<'_>) -> Result<Vec<T
         let plan = file.map(|file| job.plan_of(block, &file));
         match &report.luma.plan {
             None => observe(Event::Warning(format!(
-                "{}: its report does not tell which plan it was trained for",
+                "{}: its report does not say which plan it was trained for",
                 path.display()
             ))),
             trained if *trained != plan => {

@@ -475,7 +475,7 @@ fn gray_images(
         // Single photos may show nothing that has any color.
         return Ok((in_gray > 0 && in_gray == answered).then(|| {
             format!(
-                "{} gives each photo one color, gray or another: `gs-chroma teacher check` tells how it answers",
+                "{} gives each photo one color, gray or another: `gs-chroma teacher check` shows its answers",
                 path.display()
             )
         }));

@@ -186,7 +186,7 @@ impl ViewedScene {
                         .folder()
                         .map(RunFolder::teacher)
                         .unwrap_or_default(),
-                    format!("the run's teacher cannot be asked: {reason}"),
+                    format!("the run's teacher cannot be used: {reason}"),
                 )
                 .into());
             }

@@ -25,7 +25,7 @@ impl WriteOptions {
 }
 
 /// Extensions of others that are neither read nor written, and how to come to one that is read.
-const FOREIGN: [(&str, &str); 3] = [
+const FOREIGN: [(&str, &str); 4] = [
     (
         "ksplat usd usdc usdz gltf lcc lcc2 rad json splatv spx zip csv html",
         CONVERT,
@@ -37,6 +37,10 @@ const FOREIGN: [(&str, &str); 3] = [
     (
         "obj las laz e57 pcd xyz pts stl fbx dae",
         "a point cloud or mesh has no Gaussians: give a trained scene as .ply",
+    ),
+    (
+        "mp4 mov m4v mkv mxf avi webm jpg jpeg png tif tiff dpx exr",
+        "`gs-chroma auto` makes a scene of films and photos",
     ),
 ];
 const CONVERT: &str = "convert it to .ply, for example with splat-transform";

@@ -21,6 +21,14 @@ pub enum StoreError {
     /// A program of others, such as FFmpeg.
     #[error(transparent)]
     Program(#[from] ProgramError),
+    /// Results of a film of several shots, each of which has a run of its own.
+    #[error("{}: holds a run for each shot; name one: {}", folder.display(), listed(runs))]
+    SeveralRuns {
+        /// The folder of the results.
+        folder: PathBuf,
+        /// The shots' runs, in order.
+        runs: Vec<PathBuf>,
+    },
     /// There is no run to go on with.
     #[error("no run under runs/")]
     NoRun,
@@ -63,6 +71,12 @@ pub enum StoreError {
         /// Checkpoint at fault.
         path: PathBuf,
     },
+}
+
+/// Paths in one line.
+fn listed(paths: &[PathBuf]) -> String {
+    let paths = paths.iter().map(|path| path.display().to_string());
+    paths.collect::<Vec<_>>().join(", ")
 }
 
 impl StoreError {

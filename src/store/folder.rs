@@ -25,8 +25,23 @@ use crate::{
 /// The run in a folder of `auto`'s results.
 pub(crate) const OF_AUTO: &str = "run";
 
+/// Results of a film of several shots, below those of the whole: a folder for each shot.
+pub(crate) const SHOTS_OF_AUTO: &str = "shots";
+
 /// Default parent folder of runs.
 const RUNS: &str = "runs";
+
+/// The runs of a film's shots in a folder of `auto`'s results, in order.
+fn runs_of_shots(folder: &Path) -> Vec<PathBuf> {
+    let shots = fs::read_dir(folder.join(SHOTS_OF_AUTO));
+    let shots = shots.into_iter().flatten().flatten();
+    let runs = shots.map(|shot| shot.path().join(OF_AUTO));
+    let mut runs: Vec<PathBuf> = runs
+        .filter(|run| RunFolder::at(run).report().is_file())
+        .collect();
+    runs.sort();
+    runs
+}
 
 /// The folder of one run; docs/run-folder.md lists what lies in it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,13 +61,25 @@ impl RunFolder {
     }
 
     /// The run at `path`, or that of `auto`'s results there; the newest where none is named.
+    ///
+    /// # Errors
+    /// [`StoreError::SeveralRuns`] of the results of several shots.
     pub fn find(path: Option<&Path>) -> Result<Self, StoreError> {
         let Some(path) = path else {
             return Self::newest();
         };
         let (named, below) = (Self::at(path), Self::at(&path.join(OF_AUTO)));
-        let is_below = !named.report().exists() && below.report().is_file();
-        Ok(if is_below { below } else { named })
+        match () {
+            () if named.report().exists() => Ok(named),
+            () if below.report().is_file() => Ok(below),
+            () => match runs_of_shots(path) {
+                runs if runs.is_empty() => Ok(named),
+                runs => Err(StoreError::SeveralRuns {
+                    folder: path.to_owned(),
+                    runs,
+                }),
+            },
+        }
     }
 
     /// The run under `runs/` whose report is newest.
@@ -265,5 +292,34 @@ impl RunFolder {
             StoreError::file(&path, format!("{reason}: run `gs-chroma colorize` again"))
         })?;
         Ok(Some(field))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_of_auto_stand_for_their_run() {
+        let place = tempfile::tempdir().expect("a folder");
+        let out = place.path().join("out");
+        let report = |run: &Path| {
+            fs::create_dir_all(run).expect("a folder");
+            fs::write(run.join("report.json"), "{}").expect("writable");
+        };
+        let found = || RunFolder::find(Some(&out));
+        assert!(matches!(found(), Ok(run) if run.path() == out));
+        // A shot without a scene has no run.
+        fs::create_dir_all(out.join("shots/001")).expect("a folder");
+        assert!(matches!(found(), Ok(run) if run.path() == out));
+        let shots = ["003", "002"].map(|shot| out.join("shots").join(shot).join("run"));
+        shots.iter().for_each(|run| report(run));
+        let [third, second] = shots;
+        let listed = [second, third];
+        assert!(matches!(found(), Err(StoreError::SeveralRuns { runs, .. }) if runs == listed));
+        report(&out.join("run"));
+        assert!(matches!(found(), Ok(run) if run.path() == out.join("run")));
+        report(&out);
+        assert!(matches!(found(), Ok(run) if run.path() == out));
     }
 }

@@ -92,13 +92,7 @@ fn figures(report: &Report) -> Vec<[String; 2]> {
     row("Preset", report.preset.to_string());
     row("Iterations", luma.iterations.to_string());
     if let Some(quality) = &luma.held_out {
-        row(
-            "Held-out photos",
-            format!(
-                "{:.2} dB PSNR, {:.4} SSIM (luma)",
-                quality.psnr, quality.ssim
-            ),
-        );
+        row("Gray scene", quality.in_words());
     }
     row("Training", format!("{:.0} s", luma.seconds.train));
     row("Device", report.device.name.clone());
@@ -144,10 +138,7 @@ pub fn thinned(rows: &[[f64; 2]]) -> Vec<[f64; 2]> {
 pub fn plan(effects: &[EffectReport]) -> Vec<Value> {
     let of = |effect: &EffectReport| {
         let why = match effect.evidence {
-            Some(found) => format!(
-                "{found:.2} {}; called for from {} on",
-                effect.unit, effect.threshold
-            ),
+            Some(found) => format!("{found:.2} {}; threshold {}", effect.unit, effect.threshold),
             None => String::new(),
         };
         json!({ "effect": effect.name, "on": effect.on, "why": why })

@@ -47,6 +47,11 @@ fn each_step_is_done_once_and_again_when_what_it_is_made_from_changes() {
         "out",
         "--preset",
         "draft",
+        // Options of its steps.
+        "--channel",
+        "g",
+        "--memory-limit",
+        "900",
         "--teacher",
     ];
     let by = |teacher: &str| -> Vec<String> {
@@ -67,6 +72,33 @@ fn each_step_is_done_once_and_again_when_what_it_is_made_from_changes() {
     ] {
         assert!(place.path(file).is_file(), "{file}");
     }
+    let report = place.report("out/run");
+    assert_eq!(report["capture"]["channel"], "g");
+    let limits = ["luma", "chroma"].map(|stage| report[stage]["settings"]["memory_limit"].clone());
+    assert_eq!(limits, [900 << 20; 2]);
+    // The folder stands for its run, unless it has one for each shot.
+    assert!(place.succeed(&["info", "out"]).contains("out/run"));
+    place.succeed(&["export", "out", "-o", "copy.ply"]);
+    for shot in ["001", "003"] {
+        place.write(
+            &format!("film/shots/{shot}/run/report.json"),
+            report.to_string(),
+        );
+    }
+    for command in [
+        &["info", "film"][..],
+        &["export", "film", "-o", "copy.ply"],
+        &["fit", "film", "-o", "again"],
+    ] {
+        let several = place.run(command);
+        assert_eq!(several.code, Some(1));
+        let runs = ["001", "003"].map(|shot| format!("film/shots/{shot}/run"));
+        assert!(
+            several.stderr.contains(&runs.join(", ")),
+            "{}",
+            several.stderr
+        );
+    }
     let told = place.json(&[&first[..], &["--json"]].concat());
     for (key, value) in [
         ("colored", "out/colored"),
@@ -86,6 +118,11 @@ fn each_step_is_done_once_and_again_when_what_it_is_made_from_changes() {
     let luma = place.read("out/run/luma.ply");
     assert_eq!(begun(&place, &second, 2), all[1..3]);
     assert!(place.read("out/run/luma.ply") == luma);
+    // Nor does another option leave the gray scene.
+    assert_eq!(
+        begun(&place, &[&second[..], &["--seed", "1"]].concat(), 1),
+        all[..1]
+    );
     // A photo that has changed leaves nothing.
     super::scene::photo(2)
         .save(place.path("scene/images/03.png"))

@@ -213,7 +213,7 @@ fn blocks_are_trained_and_put_together() {
     }
     let printed = place.succeed(&["merge", "job", "-o", "agreed"]);
     assert!(
-        printed.contains("held-out views across borders: "),
+        printed.contains("held-out PSNR across borders: "),
         "{printed}"
     );
     let alone = place.json(&["fit", "job/block-2", "--iterations", "1", "--json"]);

@@ -213,7 +213,7 @@ fn the_page_shows_every_view_with_files_that_are_there() {
     let film = place.path("runs/scene/eval/flight.mp4").exists();
     assert_eq!(page.contains("<video src=\"flight.mp4\""), film);
     assert_eq!(page.contains("data-frames=\"3\""), !film);
-    for part in ["which nobody sees", "<li>the gray scene shows"] {
+    for part in ["which is invisible", "<li>gray scene: held-out PSNR"] {
         assert!(page.contains(part), "{part}: {page}");
     }
     let mut sources = 0;

@@ -247,7 +247,7 @@ fn what_it_cannot_do_it_says() {
         assert!(!place.path(output).exists(), "{output}");
     }
     for rate in ["0", "25/0", "film"] {
-        let done = place.run(&["frames", "-o", "out.mp4", "--frame-rate", rate]);
+        let done = place.run(&["frames", "-o", "out.mp4", "--fps", rate]);
         assert_eq!(done.code, Some(2), "{rate}");
     }
     let mut command = place.command(&["frames", "-o", "out.mp4"]);

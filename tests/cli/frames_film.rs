@@ -105,13 +105,7 @@ fn a_film_has_all_frames_the_rate_and_the_sound_of_its_source() {
     assert!(text("told.txt").contains("-framerate 25/1 "));
     // At another rate frames are repeated: the sound does not run any slower.
     let done = run(
-        &[
-            "frames",
-            "-o",
-            "films/fast.mp4",
-            "--frame-rate",
-            "48000/1001",
-        ],
+        &["frames", "-o", "films/fast.mp4", "--fps", "48000/1001"],
         &path,
     );
     assert_eq!(done.code, Some(0), "{}", done.stderr);

@@ -20,7 +20,7 @@ fn info_on_a_run() {
     for part in [
         "Photos    10 with a pose from",
         "60 iterations with the preset draft",
-        "held-out photos: PSNR",
+        "held-out PSNR ",
         "from ddcolor_tiny.onnx (DDColor)",
         "luma.ply",
         "\nnext: gs-chroma frames runs/scene -o colored\n",

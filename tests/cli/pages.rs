@@ -343,10 +343,30 @@ fn every_page_is_in_an_index() {
 #[test]
 fn short_help_fits_a_screen() {
     let place = Place::new();
+    // As it is shown, in lines of 80 columns.
     for command in COMMANDS {
         let help = place.succeed(&[command, "-h"]);
         let lines = help.lines().count();
         assert!(lines <= 40, "{command}: {lines}\n{help}");
+    }
+}
+
+#[test]
+fn help_is_no_wider_than_a_terminal() {
+    let place = Place::new();
+    let actions = ["list", "fetch", "check"].map(|action| vec!["teacher", action]);
+    let commands = COMMANDS.into_iter().map(|command| vec![command]);
+    for words in commands.chain(actions).chain([vec![]]) {
+        for how in ["-h", "--help"] {
+            let help = place.succeed(&[&words[..], &[how]].concat());
+            let widest = help.lines().map(|line| line.chars().count()).max();
+            assert!(widest <= Some(80), "{words:?} {how}: {widest:?}\n{help}");
+            // A command that is broken is no command.
+            let examples = help.split_once("\nExample:\n").unwrap_or_default().1;
+            let mut indented = examples.lines().filter(|line| line.starts_with(' '));
+            let broken = indented.find(|line| !line.contains("gs-chroma "));
+            assert_eq!(broken, None, "{help}");
+        }
     }
 }
 

@@ -191,5 +191,5 @@ fn the_plan_says_what_to_type_next() {
         last,
         "next: gs-chroma fit scene --preset draft --without exposure"
     );
-    assert!(words.contains("exposure           off ") && words.contains("; set by you"));
+    assert!(words.contains("exposure     off ") && words.contains("; set by you"));
 }

@@ -19,7 +19,7 @@ pub fn doubts(capture: &Capture, cameras: &[Camera]) -> Vec<String> {
     let mut doubts = Vec::new();
     let count = photos(capture).0.len();
     if count == 1 {
-        doubts.push("there is one photo: nothing tells depths; add photos from elsewhere".into());
+        doubts.push("there is one photo: depths cannot be found; add photos from elsewhere".into());
     } else if capture.is_panorama() {
         doubts.push(format!(
             "all {count} photos are taken from one place: the scene is a panorama without depth, right from there only"

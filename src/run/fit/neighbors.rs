@@ -99,7 +99,7 @@ impl FitRequest {
         // Each block has surroundings of its own.
         let shell = own.len().saturating_sub(self.surroundings())..own.len();
         observe(Event::Note(format!(
-            "goes on with {} of the merged scene's {scene} Gaussians; what photos show of the others is taken off them",
+            "continues with {} of the merged scene's {scene} Gaussians; what photos show of the others is taken off them",
             taken.len(),
         )));
         let mut start = merged.chosen(&taken);

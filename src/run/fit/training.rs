@@ -411,7 +411,7 @@ fn in_words(progress: &LumaProgress) -> String {
         let rise = look
             .per_minute
             .map_or(String::new(), |rise| format!(" ({rise:+.1}/min)"));
-        format!("{:.2} dB{rise}, ", look.psnr)
+        format!("PSNR {:.1} dB{rise}, ", look.psnr)
     });
     format!(
         "{looked}loss {:.4}, {} splats",

@@ -22,6 +22,8 @@ const SIDE: u32 = 512;
 pub(crate) struct PlainFramesOptions {
     /// Folder of the shot, with `film.json` and `frames/`.
     pub capture: PathBuf,
+    /// Channel and tone of the frames.
+    pub load: LoadOptions,
     /// The teacher; the frames stay gray without one.
     pub teacher: Option<(PathBuf, TeacherSettings)>,
     /// A folder for pictures, or a film by its extension.
@@ -68,7 +70,7 @@ pub(crate) fn frames_without_scene(
         }
         None => None,
     };
-    let loader = Loader::new(LoadOptions::default());
+    let loader = Loader::new(options.load.clone());
     let to = &options.output;
     let mut out = FrameOutput::open(to, codec, rate, Some(&film), &shots, observe)?;
     let mut steadied = Steadied::default();

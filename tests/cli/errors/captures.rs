@@ -123,19 +123,25 @@ pub(super) const CASES: &[Case] = &[
         "a file as folder",
         nothing,
         "fit onnx/truncated.onnx --preset draft -o out",
-        &["truncated.onnx", "no such folder"],
+        &["truncated.onnx", "no such folder", "gs-chroma prepare"],
+    ),
+    case(
+        "a film as scene",
+        |p| p.write("film.mp4", "a film"),
+        "view film.mp4",
+        &["film.mp4", "gs-chroma auto"],
     ),
     case(
         "no images/",
         |p| std::fs::rename(p.path("scene/images"), p.path("scene/photos")).expect("a folder"),
         FIT,
-        &["scene", "images/", "put the photos that COLMAP saw there"],
+        &["scene", "images/", "COLMAP saw there", "gs-chroma prepare"],
     ),
     case(
         "no model",
         |p| std::fs::remove_dir_all(p.path("scene/sparse")).expect("a folder"),
         FIT,
-        &["scene", "no COLMAP model", "sparse/0/"],
+        &["scene", "no COLMAP model", "sparse/0/", "gs-chroma prepare"],
     ),
     case(
         "half a model",

@@ -151,7 +151,7 @@ fn the_sharpest_frames_are_taken() {
     }
     // Another rate takes the frames that are there.
     super::calls(&place);
-    succeed(&place, &[&FILM[..], &["--per-second", "99"]].concat());
+    succeed(&place, &[&FILM[..], &["--pose-fps", "99"]].concat());
     assert_eq!(place.files("house/images").len(), 40);
     let calls = super::calls(&place);
     assert!(

@@ -482,7 +482,7 @@ fn wrong_usage_is_told() {
     }
     refused(
         &place,
-        &with(&["--per-second", "3"]),
+        &with(&["--pose-fps", "3"]),
         &["frames a second", "folder of photos"],
     );
 }

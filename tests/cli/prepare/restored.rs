@@ -112,7 +112,7 @@ fn chroma(frame: &[[f64; 3]]) -> f64 {
 fn an_old_film_comes_back_in_color() {
     let place = Place::new();
     film(&place);
-    let house = ["-o", "house", "--per-second", PER_SECOND];
+    let house = ["-o", "house", "--pose-fps", PER_SECOND];
     let made = place.json(&[&["prepare", "film.mp4", "--json"], &house[..]].concat());
     assert_eq!(
         made["film"]["frames"].as_array().map(Vec::len),
