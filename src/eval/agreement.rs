@@ -10,7 +10,8 @@ use std::{
 };
 
 use super::{
-    ColoredScene, Drawing, EvalError, Layer, Observer, Painter, Progress, Task, mean_pictures,
+    ColoredScene, Drawing, EvalError, Layer, MethodAb, Observer, Painter, Progress, Task,
+    mean_pictures,
     picture::{ab_of, to_picture},
 };
 use crate::{
@@ -44,7 +45,7 @@ const MAX_POINTS: usize = 2000;
 struct Frame {
     camera: Camera,
     depth: Vec<f32>,
-    colors: Vec<(Method, Vec<[f32; 2]>)>,
+    colors: Vec<MethodAb>,
 }
 
 #[derive(Default)]

@@ -24,7 +24,7 @@ pub use colored::{COLUMNS, Measured};
 pub use detector::{Detected, Detector};
 pub use lpips::Lpips;
 pub use luma::{GRAY_COLUMNS, gray_rows, mean_quality, measure_luma};
-pub use painter::{Drawing, Layer, Painter, Source};
+pub use painter::{Drawing, Layer, MethodAb, Painter, Source};
 pub use path_frames::frames_in;
 pub use peers::Peer;
 pub use progress::{Observer, Progress, Task};

@@ -43,6 +43,9 @@ pub enum Layer {
     Rgb(Vec<[f32; 3]>),
 }
 
+/// A method and a and b of its picture, `[height, width]`.
+pub type MethodAb = (Method, Vec<[f32; 2]>);
+
 /// A viewpoint.
 pub struct Drawing {
     /// Camera of the viewpoint.

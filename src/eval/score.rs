@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::{
-    ColoredScene, Drawing, EvalError, Layer, Lpips, Observer, Painter, Progress, Reference, Task,
+    ColoredScene, Drawing, EvalError, Layer, Lpips, MethodAb, Observer, Painter, Progress,
+    Reference, Task,
     picture::{ab_of, as_photo, gray_picture, to_picture},
 };
 use crate::{
@@ -62,7 +63,7 @@ impl Drawing {
     }
 
     /// Scores of each method's picture against the gray one in 8 bits, and its a/b.
-    pub fn scores(&self) -> Vec<(PictureScore, (Method, Vec<[f32; 2]>))> {
+    pub fn scores(&self) -> Vec<(PictureScore, MethodAb)> {
         let reference = Reference {
             photo: &as_photo(&self.gray),
             exposure: Exposure::NONE,
