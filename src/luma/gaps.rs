@@ -3,14 +3,13 @@
 
 use std::{
     collections::{BTreeSet, HashMap},
-    num::NonZero,
-    thread,
+    convert::Infallible,
 };
 
 use glam::DVec3;
 
 use super::matching::{SmallPhoto, slant_through};
-use crate::capture::{Capture, CaptureError, Dataset};
+use crate::capture::{Capture, CaptureError, Dataset, in_order};
 
 /// Photos that are matched, at most, evenly chosen: each with so many of its nearest ones.
 const MAX_VIEWS: usize = 48;
@@ -33,6 +32,9 @@ const PLANE: usize = 12;
 /// Correlation with the photos nearby, the mean of the best two, from which a depth is believed
 /// (docs/experiments.md).
 const CORRELATED: f64 = 0.7;
+
+/// Cells that a thread takes at a time: a sky takes less than a lawn.
+const PART: usize = 64;
 
 /// A point that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -169,21 +171,22 @@ impl<'a> Gaps<'a> {
                 cell.map(|at| ((at as f64 + 0.5) * self.side).floor() + 0.5)
             })
             .collect();
-        let threads = thread::available_parallelism().map_or(1, NonZero::get);
-        let share = pixels.len().div_ceil(threads).max(1);
-        // In the order of the cells, however many threads there are.
-        thread::scope(|scope| {
-            let parts: Vec<_> = (pixels.chunks(share))
-                .map(|part| {
-                    let found = |&pixel: &[f64; 2]| self.point_at(pixel, neighbors);
-                    scope.spawn(move || part.iter().filter_map(found).collect::<Vec<_>>())
-                })
-                .collect();
-            let joined = parts
-                .into_iter()
-                .map(|part| part.join().unwrap_or_default());
-            joined.flatten().collect()
-        })
+        let parts: Vec<&[[f64; 2]]> = pixels.chunks(PART).collect();
+        let found = |part: &&[[f64; 2]]| {
+            let points = part
+                .iter()
+                .filter_map(|&pixel| self.point_at(pixel, neighbors));
+            points.collect::<Vec<_>>()
+        };
+        let mut all = Vec::new();
+        let taken = in_order(&parts, found, |_, points| {
+            all.extend(points);
+            Ok::<_, Infallible>(())
+        });
+        match taken {
+            Ok(()) => all,
+            Err(never) => match never {},
+        }
     }
 
     /// The point on the ray of a pixel.
