@@ -25,6 +25,7 @@ use nix::sys::{
     time::TimeValLike,
 };
 
+/// Turns, of which the first may compile kernels: the median is of another one.
 const TURNS: usize = 3;
 const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo");
 const TEACHER: &str = concat!(
@@ -125,17 +126,13 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     let stages = stages(files.next().transpose()?);
     let programs = [old, PathBuf::from(env!("CARGO_BIN_EXE_gs-chroma"))];
     let place = tempfile::tempdir()?;
-    // The first turn compiles kernels.
     let mut costs: Vec<[Vec<Cost>; 2]> = stages.iter().map(|_| Default::default()).collect();
     let folders = [0, 1].map(|which| place.path().join(which.to_string()));
-    for turn in 0..=TURNS {
+    for _ in 0..TURNS {
         folders.iter().try_for_each(fs::create_dir)?;
         for (stage, costs) in stages.iter().zip(&mut costs) {
             for ((program, folder), costs) in programs.iter().zip(&folders).zip(costs) {
-                let cost = stage.cost(program, folder)?;
-                if turn > 0 {
-                    costs.push(cost);
-                }
+                costs.push(stage.cost(program, folder)?);
             }
         }
         folders.iter().try_for_each(fs::remove_dir_all)?;

@@ -1,6 +1,6 @@
 """Makes a COLMAP folder of many photos, to see what memory and time a large capture takes.
 
-    python3 tools/make_large_capture.py --photos 300 --size 1600x1200 OUT [--teacher OUT2]
+    python3 tools/make_large_capture.py --photos 300 --size 1600x1200 OUT [--teacher OUT2] [--points N]
 
 Photos are the bundled garden's, enlarged and in gray; there are no more than 14 different
 ones, and each further photo is a hard link to one of them. Cameras stand on an arc around a
@@ -71,7 +71,7 @@ def in_ball(numbers: random.Random) -> list[float]:
             return place
 
 
-def write_model(folder: Path, count: int, size: tuple[int, int]) -> None:
+def write_model(folder: Path, count: int, size: tuple[int, int], points: int) -> None:
     """Writes cameras, poses, points and tracks as COLMAP's text files."""
     folder.mkdir(parents=True, exist_ok=True)
     width, height = size
@@ -84,7 +84,6 @@ def write_model(folder: Path, count: int, size: tuple[int, int]) -> None:
     poses = [pose(angle) for angle in angles]
     seen: list[list[str]] = [[] for _ in range(count)]
     lines = []
-    points = max(POINTS_MIN, 4 * count)
     for point in range(1, points + 1):
         place = in_ball(numbers)
         first = numbers.randrange(max(1, count - NEIGHBORS + 1))
@@ -117,12 +116,14 @@ def main() -> None:
     parser.add_argument("out", type=Path, help="the COLMAP folder to write")
     parser.add_argument("--photos", type=int, default=300)
     parser.add_argument("--size", type=size_of, default=(1600, 1200), metavar="WxH")
+    parser.add_argument("--points", type=int, help="four for each photo, 3000 at least")
     parser.add_argument("--color", action="store_true", help="photos in color, not in gray")
     parser.add_argument("--teacher", type=Path, help="also write the photos in color here")
     arguments = parser.parse_args()
     mode = "RGB" if arguments.color else "L"
     write_photos(arguments.out / "images", arguments.photos, arguments.size, mode)
-    write_model(arguments.out / "sparse/0", arguments.photos, arguments.size)
+    points = arguments.points or max(POINTS_MIN, 4 * arguments.photos)
+    write_model(arguments.out / "sparse/0", arguments.photos, arguments.size, points)
     if arguments.teacher:
         write_photos(arguments.teacher, arguments.photos, arguments.size, "RGB")
 

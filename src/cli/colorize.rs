@@ -311,10 +311,9 @@ impl Colorize {
         if let Some(rows) = chroma.and_then(|chroma| chroma.timings.as_ref()) {
             print(timings_table(rows))?;
         }
-        let teacher = options.teach.teachers.first().map(|(path, _)| path);
         let run = output.contact_sheet.as_deref().and_then(Path::parent);
         let next = match run {
-            Some(run) => next::eval(run, teacher.map(PathBuf::as_path)),
+            Some(run) => next::eval(run),
             None => next::view(&output.ply),
         };
         let wrote = [Some(output.ply.as_path()), output.contact_sheet.as_deref()];

@@ -43,7 +43,7 @@ const RECIPES: &[(Peer, &str)] = &[
 pub struct Eval {
     /// Run folder [default: newest under runs/].
     run: Option<PathBuf>,
-    /// Also measure this teacher's own pictures, as for colorize.
+    /// Teacher to measure beside the scene [default: the run's own].
     #[arg(long, help_heading = TEACHER, value_name = "TEACHER")]
     teacher: Option<PathBuf>,
     #[command(flatten)]

@@ -34,14 +34,9 @@ pub(super) fn colorize(run: &Path) -> String {
     )
 }
 
-/// `eval` beside the teacher, if there was one.
-pub(super) fn eval(run: &Path, teacher: Option<&Path>) -> String {
-    let run = run.to_string_lossy();
-    let teacher = teacher.map(Path::to_string_lossy);
-    match &teacher {
-        Some(teacher) => line(&["eval", &run, "--teacher", teacher]),
-        None => line(&["eval", &run]),
-    }
+/// `eval` of a run.
+pub(super) fn eval(run: &Path) -> String {
+    line(&["eval", &run.to_string_lossy()])
 }
 
 /// `frames` of a run.

@@ -45,8 +45,8 @@ const MAX_ROWS: usize = 24;
 pub struct EvalOptions {
     /// Run folder; the newest run by default.
     pub run: Option<PathBuf>,
-    /// Teacher to measure beside the scene; by default the one that colored the run, where it was
-    /// one.
+    /// Teacher to measure beside the scene; by default the one that colored the run, the first of
+    /// several.
     pub teacher: Option<PathBuf>,
     pub teacher_settings: TeacherSettings,
     /// COLMAP folder, where it is not the one that `fit` noted.
@@ -359,13 +359,12 @@ fn ask(
     Ok(Some(asked.map_err(covers_nothing(options, dataset))?))
 }
 
-/// The options with the run's own teacher, where none is named and a single one colored it.
+/// The options with the run's own teacher, the first of several, where none is named.
 fn with_own_teacher(options: &EvalOptions, report: &Report) -> EvalOptions {
     let mut options = options.clone();
     let own = TeachOptions::of_run(report);
-    let colored_by = (report.chroma.as_ref()).map_or(0, |chroma| chroma.teachers.len());
-    if let (None, 1, [(path, _)]) = (&options.teacher, colored_by, &own.teachers[..]) {
-        options.teacher = Some(path.clone());
+    if let (None, Some((path, _))) = (&options.teacher, own.teachers.into_iter().next()) {
+        options.teacher = Some(path);
         options.teacher_settings = own.settings;
     }
     options
