@@ -35,7 +35,9 @@ impl Decision {
     fn reasons(&self) -> Option<String> {
         let unknown = match (self.evidence, self.effect) {
             (Some(_), _) | (None, Effect::Masks) => None,
-            (None, Effect::ChromaDegree) => Some("tried only for an automatic SH degree".to_owned()),
+            (None, Effect::ChromaDegree) => {
+                Some("tried only for an automatic SH degree".to_owned())
+            }
             (None, _) => Some("no photos share a point".to_owned()),
         };
         let decider = match (self.decided_by, self.effect) {
