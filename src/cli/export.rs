@@ -37,7 +37,7 @@ const VIEWERS: &[(ViewerChoice, &str)] = &[
 pub struct Export {
     /// Run folder or splat file [default: newest run under runs/].
     run: Option<PathBuf>,
-    /// File to write; its extension chooses the format.
+    /// File to write: .ply, .compressed.ply, .splat, .spz, .sog, .glb, .usda or .html.
     #[arg(short, long, value_name = "FILE", help_heading = OUTPUT)]
     output: PathBuf,
     /// Write the gray scene of a colored run.

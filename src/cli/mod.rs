@@ -107,8 +107,9 @@ impl Cli {
     pub fn of_arguments() -> Self {
         let arguments = Invocation::present().arguments.iter().cloned();
         let words = iter::once("gs-chroma".into()).chain(arguments);
-        let matches = program().get_matches_from(words);
-        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+        let matches = program().try_get_matches_from(words);
+        let parsed = matches.and_then(|matches| Self::from_arg_matches(&matches));
+        parsed.unwrap_or_else(|error| usage::with_tip(error).exit())
     }
 
     /// Runs the command and gives the exit status; what stops it is told in one line on standard

@@ -394,6 +394,7 @@ fn wrong_arguments_are_told_with_the_commands_usage() {
             &["prepare", "f.mp4", "-o", "o", "--start", "9", "--end", "5"],
             "Usage: gs-chroma prepare",
         ),
+        (&["auto", "film.mp4", "-o", "o"], "gs-chroma teacher list"),
     ] {
         let done = place.run(arguments);
         assert_eq!(done.code, Some(2));
