@@ -30,6 +30,7 @@ use crate::{
         CheckpointOptions, Codec, Interrupt, RunFolder, StoreError, files, folder::OF_AUTO,
         originals,
     },
+    subject::Live,
     tell::{Event, Observer, Stage},
 };
 
@@ -58,6 +59,8 @@ pub struct AutoOptions {
     pub without_eval: bool,
     /// Interrupt flag of training and coloring, after which they can continue.
     pub interrupt: Arc<Interrupt>,
+    /// State for live viewers.
+    pub live: Option<Arc<Live>>,
 }
 
 /// Event of a run of `auto`.
@@ -172,6 +175,7 @@ fn make_scene(
         output: Some(run.path().to_owned()),
         preset: options.preset,
         checkpoints: checkpoints(options),
+        live: options.live.clone(),
         ..FitRequest::new(house.to_owned())
     };
     let results_of = [&*run.luma(), &run.report()];
@@ -197,6 +201,7 @@ fn make_scene(
             ..TeachOptions::default()
         },
         checkpoints: checkpoints(options),
+        live: options.live.clone(),
         ..ColorizeRequest::default()
     };
     let results_of = [&*run.color(), &run.chroma()];
