@@ -316,15 +316,16 @@ mod tests {
         // A bright thing on dark ground; the scene ends just beside it.
         let mut photo = canvas(0.0);
         let mut seen = WeightedColors::nothing(photo.len());
-        let mut paint = vec![[0.0; 3]; photo.len()];
-        for i in 0..photo.len() {
-            let (x, y) = (i as u32 % SIZE[0], i as u32 / SIZE[0]);
-            photo.gray[i] = if x < 66 { 200 } else { 70 };
-            seen.weight[i] = f32::from(x < 68);
-            if (8..70).contains(&x) && (30..33).contains(&y) {
-                paint[i] = [BLUE[0], BLUE[1], 1.0];
-            }
-        }
+        let pixels = (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y)));
+        photo.gray = pixels
+            .clone()
+            .map(|(x, _)| if x < 66 { 200 } else { 70 })
+            .collect();
+        seen.weight = pixels.clone().map(|(x, _)| f32::from(x < 68)).collect();
+        let painted = pixels.map(|(x, y)| f32::from((8..70).contains(&x) && (30..33).contains(&y)));
+        let paint = painted
+            .map(|alpha| [BLUE[0], BLUE[1], 1.0].map(|value| alpha * value))
+            .collect();
         let [width, height] = SIZE;
         let stroke = HintImage {
             width,
