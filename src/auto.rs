@@ -33,6 +33,7 @@ use crate::{
         CheckpointOptions, Codec, Interrupt, RunFolder, StoreError, files, folder::OF_AUTO,
         originals,
     },
+    subject::Live,
     tell::{Event, Observer, Stage},
 };
 
@@ -62,6 +63,8 @@ pub struct AutoOptions {
     pub without_eval: bool,
     /// Interrupt flag of training and coloring, after which they can continue.
     pub interrupt: Arc<Interrupt>,
+    /// State for live viewers.
+    pub live: Option<Arc<Live>>,
 }
 
 /// Event of a run of `auto`.
@@ -176,6 +179,7 @@ fn make_scene(
         colmap_dir: house.to_owned(),
         output: Some(run.path().to_owned()),
         checkpoints: checkpoints(options),
+        live: options.live.clone(),
         ..options.fit.clone()
     };
     let results_of = [&*run.luma(), &run.report()];
@@ -207,6 +211,7 @@ fn make_scene(
         },
         settings,
         checkpoints: checkpoints(options),
+        live: options.live.clone(),
         ..ColorizeRequest::default()
     };
     let results_of = [&*run.color(), &run.chroma()];

@@ -18,6 +18,7 @@ use super::{
     print,
     progress::Progress,
     values::{PRESETS, folder, one_of},
+    view::ViewArguments,
 };
 use crate::{
     auto::{
@@ -82,6 +83,8 @@ pub struct Auto {
     /// Leave out the measurements and their page.
     #[arg(long, help_heading = OUTPUT)]
     no_eval: bool,
+    #[command(flatten)]
+    view: ViewArguments,
     /// Print the paths of all results as JSON.
     #[arg(long, help_heading = OUTPUT)]
     json: bool,
@@ -104,6 +107,7 @@ impl Auto {
 
     pub(super) fn run(self) -> Result<(), CliError> {
         let output = self.output;
+        let live = self.view.begin(&output)?;
         let options = AutoOptions {
             prepare: self.input.options(output.join("house"), false),
             output,
@@ -121,6 +125,7 @@ impl Auto {
             frame_rate: None,
             without_eval: self.no_eval,
             interrupt: interrupt(),
+            live: live.clone(),
         };
         let mut whole = Progress::default();
         let mut progress = Progress::default();
@@ -145,7 +150,10 @@ impl Auto {
                 whole.join(&mut progress);
                 heading(step, ": its result is there");
             }
-            AutoEvent::Event(event) => progress.show(&event),
+            AutoEvent::Event(event) => {
+                live.iter().for_each(|live| live.tell(&event));
+                progress.show(&event);
+            }
         };
         if let Some(film) = reel::shots_of(&options, &mut tell)? {
             let made = reel::reel(&options, fallback, &film, &mut tell)?;

@@ -92,6 +92,9 @@ pub(super) struct ViewArguments {
     /// Port of the page on 127.0.0.1 [default: one that is free].
     #[arg(long, requires = "view", help_heading = OUTPUT, hide_short_help = true, value_parser = clap::value_parser!(u16).range(1..))]
     port: Option<u16>,
+    /// Print the address and open no browser.
+    #[arg(long, requires = "view", help_heading = OUTPUT, hide_short_help = true)]
+    no_open: bool,
 }
 
 impl ViewArguments {
@@ -110,7 +113,9 @@ impl ViewArguments {
         let content = LiveContent::new(folder, live.clone());
         // Ends with the program.
         thread::spawn(move || server.serve(move |request| answer(&content, request)));
-        open(&url);
+        if !self.no_open {
+            open(&url);
+        }
         Ok(Some(live))
     }
 }

@@ -40,21 +40,21 @@ impl Strokes {
     pub fn of(canvas: &Canvas, seen: &WeightedColors, paint: &HintImage, grow: bool) -> Self {
         let paint = paint.resized(canvas.width, canvas.height);
         let lightness = lightness(canvas);
-        let mut open = paint;
-        for (paint, &covered) in open.paint.iter_mut().zip(&seen.weight) {
-            if covered >= COVERED {
-                *paint = [0.0; 3];
-            }
-        }
-        let claims = match grow {
-            true => grown(canvas, seen, &lightness, &open),
-            false => (open.colors().zip(&lightness))
+        let mut claims = match grow {
+            // What a stroke is on tells what is alike, also where the scene shows it.
+            true => grown(canvas, seen, &lightness, &paint),
+            false => (paint.colors().zip(&lightness))
                 .map(|((color, alpha), &light)| {
                     let [a, b] = at_middle_lightness(color, light);
                     [alpha * a, alpha * b, alpha]
                 })
                 .collect(),
         };
+        for (claim, &covered) in claims.iter_mut().zip(&seen.weight) {
+            if covered >= COVERED {
+                *claim = [0.0; 3];
+            }
+        }
         Self::new(&claims)
     }
 
@@ -155,7 +155,8 @@ fn grown(
     lightness: &[f32],
     paint: &HintImage,
 ) -> Vec<[f32; 3]> {
-    if paint.is_empty() {
+    let mut painted = paint.colors().zip(&seen.weight);
+    if !painted.any(|((_, alpha), &covered)| alpha > 0.0 && covered < COVERED) {
         return vec![[0.0; 3]; canvas.len()];
     }
     let depth = |&covered: &f32| DEPTHS[usize::from(covered < COVERED)];
@@ -308,6 +309,34 @@ mod tests {
         covered.weight.fill(1.0);
         let none = Strokes::of(&canvas(0.0), &covered, &stroke(), true);
         assert_eq!(none.share(), 0.0);
+    }
+
+    #[test]
+    fn a_stroke_whose_end_leaves_the_scene_does_not_take_what_lies_there() {
+        // A bright thing on dark ground; the scene ends just beside it.
+        let mut photo = canvas(0.0);
+        let mut seen = WeightedColors::nothing(photo.len());
+        let pixels = (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y)));
+        photo.gray = pixels
+            .clone()
+            .map(|(x, _)| if x < 66 { 200 } else { 70 })
+            .collect();
+        seen.weight = pixels.clone().map(|(x, _)| f32::from(x < 68)).collect();
+        let painted = pixels.map(|(x, y)| f32::from((8..70).contains(&x) && (30..33).contains(&y)));
+        let paint = painted
+            .map(|alpha| [BLUE[0], BLUE[1], 1.0].map(|value| alpha * value))
+            .collect();
+        let [width, height] = SIZE;
+        let stroke = HintImage {
+            width,
+            height,
+            paint,
+        };
+        let strokes = Strokes::of(&photo, &seen, &stroke, true);
+        for (i, &alpha) in strokes.alphas.iter().enumerate() {
+            let x = i as u32 % SIZE[0];
+            assert!(alpha == 0 || (68..74).contains(&x), "{x}: {alpha}");
+        }
     }
 
     #[test]

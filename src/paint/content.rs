@@ -10,7 +10,7 @@ use super::{
     free_view::ViewStroke,
     layer::encoded,
     log::Act,
-    pictures::Colors,
+    pictures::{Colors, covered},
     session::{PaintSession, Stroke},
 };
 use crate::{
@@ -117,6 +117,10 @@ impl PaintContent {
         let Some(photo) = photo.filter(|&photo| photo < session.scene.photos.len()) else {
             return Ok(Response::not_found());
         };
+        if what == "cover" {
+            let share = json!(covered(&session.scene, photo)?).to_string();
+            return Ok(Response::ok("application/json", share));
+        }
         let png = match what {
             "photo" => Some(session.now(photo)?.to_vec()),
             "before" => session.before(photo)?,

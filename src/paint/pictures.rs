@@ -137,17 +137,7 @@ impl Pictures {
             kept.insert(0, found);
             return Ok(kept[0].1.clone());
         }
-        let seen = scene.views(photo);
-        let range = scene.dataset.options.normalize;
-        let original = scene.dataset.loader().original(seen[0].view, range)?;
-        let size = SceneDrawer::size(&seen).unwrap_or_default();
-        let mut canvas = Canvas::sized(&original, size);
-        let trained = scene.dataset.photo(scene.photos[photo].views.start)?;
-        let trained_size = [trained.width, trained.height];
-        if seen[0].view.undistortion.is_none() && trained_size == [canvas.width, canvas.height] {
-            // To the very photo that was trained on the teachers' answers are kept.
-            canvas.gray.clone_from(&trained.gray);
-        }
+        let canvas = canvas(scene, photo)?;
         let taught = scene.teachers(|teachers| {
             teachers.color(canvas.query(&scene.photos[photo].name), canvas.gray_image())
         })?;
@@ -173,4 +163,34 @@ impl Pictures {
         kept.truncate(KEPT);
         Ok(kept[0].1.clone())
     }
+}
+
+/// A photo at working size.
+fn canvas(scene: &PaintScene, photo: usize) -> Result<Canvas, RunError> {
+    let seen = scene.views(photo);
+    let range = scene.dataset.options.normalize;
+    let original = scene.dataset.loader().original(seen[0].view, range)?;
+    let size = SceneDrawer::size(&seen).unwrap_or_default();
+    let mut canvas = Canvas::sized(&original, size);
+    let trained = scene.dataset.photo(scene.photos[photo].views.start)?;
+    let trained_size = [trained.width, trained.height];
+    if seen[0].view.undistortion.is_none() && trained_size == [canvas.width, canvas.height] {
+        // To the very photo that was trained on the teachers' answers are kept.
+        canvas.gray.clone_from(&trained.gray);
+    }
+    Ok(canvas)
+}
+
+/// Share of a photo that the scene covers, 0 to 1: strokes there color the scene.
+///
+/// # Errors
+/// [`RunError`] of the photo or the device.
+pub fn covered(scene: &PaintScene, photo: usize) -> Result<f64, RunError> {
+    let canvas = canvas(scene, photo)?;
+    let fields = [&scene.believed; 2];
+    let (luma, extent) = (&scene.luma, scene.dataset.extent);
+    let mut drawer = SceneDrawer::new(&scene.raster, luma, fields, extent)?;
+    let seen = drawer.draw(&scene.views(photo), &canvas)?;
+    let sum: f64 = seen.weight.iter().map(|&weight| f64::from(weight)).sum();
+    Ok(sum / seen.weight.len().max(1) as f64)
 }

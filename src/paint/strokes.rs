@@ -1,6 +1,6 @@
 //! Layers of all photos with what can be undone, kept in the run's folder.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, io::Write, path::PathBuf};
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use image::{ExtendedColorType, RgbImage, RgbaImage};
@@ -11,7 +11,8 @@ use super::{
     scene::PaintScene,
 };
 use crate::{
-    disk, input,
+    disk::{self, Draft},
+    input,
     store::{StoreError, files},
 };
 
@@ -107,7 +108,7 @@ impl AllStrokes {
         paint: Paint,
         dabs: &[Dab],
     ) -> Result<(), StoreError> {
-        let (mut change, mut parts) = (Vec::new(), Vec::new());
+        let (mut change, mut parts, mut layers) = (Vec::new(), Vec::new(), Vec::new());
         for Dab { photo, mask, ink } in dabs {
             let mut layer = self.layer_of(scene, *photo);
             let pixels = layer.cut(mask.region);
@@ -116,7 +117,7 @@ impl AllStrokes {
                 Ink::Picture(picture) => picture.get_pixel_checked(x, y).map(|pixel| pixel.0),
                 Ink::Nothing => None,
             });
-            self.put(scene, *photo, layer)?;
+            layers.push((*photo, layer));
             parts.push(Part {
                 photo: scene.photos[*photo].name.clone(),
                 region: mask.region,
@@ -128,18 +129,19 @@ impl AllStrokes {
                 pixels,
             });
         }
+        let (act, color) = match paint {
+            Paint::Color(color) => (Act::Paint, Some(color)),
+            Paint::Teacher => (Act::Keep, None),
+            Paint::Nothing => (Act::Erase, None),
+        };
+        self.put(scene, layers, (act, color, parts))?;
         self.changes.truncate(self.done);
         self.changes.push(change);
         if self.changes.len() > UNDONE {
             self.changes.remove(0);
         }
         self.done = self.changes.len();
-        let (act, color) = match paint {
-            Paint::Color(color) => (Act::Paint, Some(color)),
-            Paint::Teacher => (Act::Keep, None),
-            Paint::Nothing => (Act::Erase, None),
-        };
-        self.log.add(act, color, parts)
+        Ok(())
     }
 
     /// Takes the last change back, or does it again; the photos that it is on.
@@ -154,37 +156,94 @@ impl AllStrokes {
         let Some(at) = at.filter(|&at| at < self.changes.len()) else {
             return Ok(Vec::new());
         };
-        let mut photos = Vec::new();
-        for k in 0..self.changes[at].len() {
-            let Changed { photo, region, .. } = self.changes[at][k];
-            let mut layer = self.layer_of(scene, photo);
-            let now = layer.cut(region);
-            layer.put(region, &self.changes[at][k].pixels);
-            self.put(scene, photo, layer)?;
-            self.changes[at][k].pixels = now;
-            photos.push(photo);
+        let (mut layers, mut before) = (Vec::new(), Vec::new());
+        for Changed {
+            photo,
+            region,
+            pixels,
+        } in &self.changes[at]
+        {
+            let mut layer = self.layer_of(scene, *photo);
+            before.push(layer.cut(*region));
+            layer.put(*region, pixels);
+            layers.push((*photo, layer));
+        }
+        let photos = layers.iter().map(|(photo, _)| *photo).collect();
+        self.put(scene, layers, (act, None, Vec::new()))?;
+        for (changed, before) in self.changes[at].iter_mut().zip(before) {
+            changed.pixels = before;
         }
         self.done = at + usize::from(act != Act::Undo);
-        self.log.add(act, None, Vec::new())?;
         Ok(photos)
     }
 
-    /// Keeps a layer on the disk; an empty one has no file.
-    fn put(&mut self, scene: &PaintScene, photo: usize, layer: Layer) -> Result<(), StoreError> {
-        let place = &scene.photos[photo];
-        let path = scene.folder.hint(&place.name);
-        if layer.is_empty() {
-            disk::remove(&path).map_err(files::at(&path))?;
-            self.layers.remove(&photo);
-            return Ok(());
+    /// Keeps layers and a line of the log on the disk, all or none.
+    fn put(
+        &mut self,
+        scene: &PaintScene,
+        layers: Vec<(usize, Layer)>,
+        (act, color, parts): (Act, Option<[u8; 3]>, Vec<Part>),
+    ) -> Result<(), StoreError> {
+        // What takes room is there before anything is in its place.
+        let drafts = layers
+            .iter()
+            .map(|(photo, layer)| draft(scene, *photo, layer));
+        let drafts = drafts.collect::<Result<Vec<_>, _>>()?;
+        self.log.add(act, color, parts)?;
+        for (k, file) in drafts.into_iter().enumerate() {
+            if let Err(error) = place(file) {
+                for (photo, _) in &layers[..k] {
+                    let _ = draft(scene, *photo, &self.layer_of(scene, *photo)).and_then(place);
+                }
+                let back = if act == Act::Undo {
+                    Act::Redo
+                } else {
+                    Act::Undo
+                };
+                let _ = self.log.add(back, None, Vec::new());
+                return Err(error);
+            }
         }
-        let png = layer.to_png(place.of_file);
-        let png = png.map_err(|reason| StoreError::file(&path, reason))?;
-        disk::make_folder(disk::folder_of(&path)).map_err(files::at(&path))?;
-        files::write(&path, &png)?;
-        self.layers.insert(photo, layer);
+        for (photo, layer) in layers {
+            match layer.is_empty() {
+                true => self.layers.remove(&photo),
+                false => self.layers.insert(photo, layer),
+            };
+        }
         Ok(())
     }
+}
+
+/// A layer's file, beside its place; an empty one has none.
+fn draft(
+    scene: &PaintScene,
+    photo: usize,
+    layer: &Layer,
+) -> Result<(PathBuf, Option<Draft>), StoreError> {
+    let of_photo = &scene.photos[photo];
+    let path = scene.folder.hint(&of_photo.name);
+    if layer.is_empty() {
+        return Ok((path, None));
+    }
+    let png = layer.to_png(of_photo.of_file);
+    let png = png.map_err(|reason| StoreError::file(&path, reason))?;
+    let write = || {
+        disk::make_folder(disk::folder_of(&path))?;
+        let mut draft = disk::create(&path)?;
+        draft.write_all(&png)?;
+        Ok(draft)
+    };
+    let draft = write().map_err(files::at(&path))?;
+    Ok((path, Some(draft)))
+}
+
+/// Puts a layer's file into its place.
+fn place((path, draft): (PathBuf, Option<Draft>)) -> Result<(), StoreError> {
+    let placed = match draft {
+        Some(draft) => draft.persist(&path),
+        None => disk::remove(&path),
+    };
+    placed.map_err(files::at(&path))
 }
 
 /// Pixels as the log keeps them; none where nothing is painted.

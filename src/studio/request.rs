@@ -93,6 +93,7 @@ impl StudioRequest {
                 if let Some(preset) = preset {
                     words.extend(["--preset".to_owned(), preset.to_string()]);
                 }
+                words.extend(["--view", "--no-open"].map(str::to_owned));
                 words.extend(more(&options)?);
                 (words, true)
             }

@@ -366,3 +366,47 @@ fn the_mouse_paints_and_the_keys_undo() {
             .is_file()
     );
 }
+
+#[test]
+fn a_stroke_that_one_of_its_photos_cannot_take_leaves_all_as_they_were() {
+    let place = garden();
+    let easel = Easel::of(&place);
+    easel.once("ready");
+    let mut camera = easel.page.about()["cameras"][2].clone();
+    for key in ["name", "split", "psnr"] {
+        camera.as_object_mut().expect("a camera").remove(key);
+    }
+    let points = across_pumpkin();
+    let stroke = json!({ "camera": camera, "paint": { "color": VIOLET }, "points": points });
+    easel.answer("view-stroke", &stroke);
+    let photos = easel.news(0)["painted"].clone();
+    let photos = photos.as_array().expect("photos");
+    let other = photos.iter().filter_map(Value::as_u64).find(|&k| k != 2);
+    let other = other.expect("a second photo");
+    let about = easel.page.about();
+    let name = about["paint"]["photos"][other as usize]["name"]
+        .as_str()
+        .expect("a name");
+    assert_eq!(easel.post("undo", &json!({})), 200);
+
+    // What cannot be replaced by a file: a folder that is not empty. The third photo comes first.
+    let hints = place.path("runs/garden/paint/hints");
+    let taken = hints.join(format!("{name}.png"));
+    std::fs::create_dir(&taken).expect("a folder");
+    std::fs::write(taken.join("x"), "x").expect("a file");
+    assert_eq!(easel.post("view-stroke", &stroke), 500);
+    let left = || std::fs::read_dir(&hints).expect("a folder").count();
+    assert_eq!(left(), 1);
+    let news = easel.news(0);
+    assert_eq!((&news["undo"], &news["painted"]), (&json!(0), &json!([])));
+    // Also after a restart.
+    drop(easel);
+    let easel = Easel::of(&place);
+    assert_eq!(easel.once("ready")["undo"], 0);
+    std::fs::remove_dir_all(&taken).expect("removed");
+    assert_eq!(easel.post("view-stroke", &stroke), 200);
+    assert_eq!(
+        (left(), easel.news(0)["undo"].clone()),
+        (photos.len(), json!(1))
+    );
+}

@@ -1,6 +1,10 @@
 //! `gs-chroma studio`: its page starts the program's commands, shows them, and nothing else.
 
-use std::time::{Duration, Instant};
+use std::{
+    io::{Read, Write},
+    net::TcpStream,
+    time::{Duration, Instant},
+};
 
 use serde_json::{Value, json};
 
@@ -92,6 +96,14 @@ fn a_job_is_started_stopped_and_resumed_and_its_results_are_handed_out() {
     let news = desk.once(begun);
     let command = news["jobs"][0]["command"].as_str().expect("a command");
     assert!(command.starts_with("gs-chroma auto "), "{command}");
+    // The scene can be watched as it grows.
+    let url = news["jobs"][0]["url"].as_str().expect("an address");
+    let host = url.trim_end_matches('/').trim_start_matches("http://");
+    let mut live = TcpStream::connect(host).expect("the page listens");
+    write!(live, "GET /scene.json HTTP/1.1\r\nHost: {host}\r\n\r\n").expect("sent");
+    let mut answer = Vec::new();
+    live.read_to_end(&mut answer).expect("an answer");
+    assert_eq!(parts(&answer).0, 200);
     let number = &news["jobs"][0]["number"];
     desk.ask(json!({ "do": "stop", "job": number }));
     desk.once(|news| news["jobs"][0]["phase"] == "stopped");

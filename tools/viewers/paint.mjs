@@ -1,10 +1,10 @@
 // Paints on a page of `gs-chroma view --paint` with the mouse, in headless Chromium.
 //
-//   node paint.mjs URL [--out DIR] [--photo N] [--wheel U,V] [--stroke X,Y,X,Y] [--size N] [--shots]
+//   node paint.mjs URL [--out DIR] [--photo N] [--wheel U,V] [--stroke X,Y,X,Y] [--size N] [--wait S] [--shots]
 //
 // Draws one stroke, places in shares of the photo, waits until the colors settle, undoes and does it
 // again; then draws the same on the scene from a view beside, and undoes that. Prints one line of
-// JSON: milliseconds until the page shows the preview and the settled colors, colors under the stroke,
+// JSON: milliseconds until the page is ready, shows the preview and the settled colors, colors under the stroke,
 // what the page says of the stroke on the scene, and errors; status 1 where there are any.
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
@@ -19,6 +19,7 @@ const { values, positionals } = parseArgs({
     wheel: { type: "string", default: "0.72,0.72" },
     stroke: { type: "string", default: "0.59,0.86,0.74,0.86" },
     size: { type: "string", default: "9" },
+    wait: { type: "string", default: "120" },
     shots: { type: "boolean", default: false },
   },
 });
@@ -31,10 +32,12 @@ try {
   page.on("pageerror", (error) => found.errors.push(String(error)));
   mkdirSync(values.out, { recursive: true });
   const shot = async (name) => values.shots && page.screenshot({ path: join(values.out, `${name}.png`) });
-  const said = (text, timeout = 120000) => page.waitForFunction((text) => document.getElementById("status").textContent.includes(text), text, { timeout });
+  const said = (text, timeout = 1000 * Number(values.wait)) => page.waitForFunction((text) => document.getElementById("status").textContent.includes(text), text, { timeout });
+  const opened = Date.now();
   await page.goto(positionals[0]);
   await page.waitForSelector("#strip button");
   await said("Ready");
+  found.ready_ms = Date.now() - opened;
   await page.locator("#strip button").nth(Number(values.photo)).click();
   await page.waitForTimeout(800);
   await shot("ready");
@@ -61,7 +64,7 @@ try {
   await page.mouse.up();
   const begun = Date.now();
   await page.mouse.move(...at(0.05, 0.05));
-  await page.waitForFunction((before) => window.gsChroma.version() > before, await page.evaluate(() => window.gsChroma.version()), { timeout: 30000, polling: 20 });
+  await page.waitForFunction((before) => window.gsChroma.version() > before, await page.evaluate(() => window.gsChroma.version()), { timeout: 1000 * Number(values.wait), polling: 20 });
   found.previewed_ms = Date.now() - begun;
   await shot("previewed");
   await said("Settled");
@@ -92,12 +95,12 @@ try {
     await page.waitForTimeout(500);
   }
   await page.keyboard.press("Control+z");
-  await page.waitForFunction(() => document.getElementById("undo").disabled);
+  await page.waitForFunction(() => document.getElementById("undo").disabled, undefined, { timeout: 1000 * Number(values.wait) });
   await said("Settled");
   await page.waitForTimeout(600);
   found.undone = await under(middle);
   await page.keyboard.press("Control+Shift+Z");
-  await page.waitForFunction(() => document.getElementById("redo").disabled);
+  await page.waitForFunction(() => document.getElementById("redo").disabled, undefined, { timeout: 1000 * Number(values.wait) });
   await said("Settled");
 
   // The same from a view beside the photo's.

@@ -126,7 +126,16 @@ export class Brush {
     this.drag = null;
     const { stroke } = this;
     this.stroke = null;
-    if (stroke) this.drawn(stroke);
+    if (!stroke) return;
+    if (stroke.paint.color && this.easel.size && this.levels) stroke.paint = { color: this.mixer.at(this.light(stroke)) };
+    this.drawn(stroke);
+  }
+
+  /** The mean lightness under a stroke: its color is that of the thing, not of the place where it begins. */
+  light({ points }) {
+    const some = points.filter((_, k) => k % Math.ceil(points.length / 100) === 0);
+    const light = some.map(([x, y, r]) => lightnessAt(this.levels, [x, y], Math.min(12, r))).filter((l) => l !== null);
+    return light.length > 0 ? light.reduce((sum, l) => sum + l, 0) / light.length : this.mixer.lightness;
   }
 
   leave() {

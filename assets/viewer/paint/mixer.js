@@ -36,7 +36,12 @@ export class Mixer {
 
   /** The color at the lightness of the wheel. */
   get color() {
-    return colorAt(this.lightness, this.ab);
+    return this.at(this.lightness);
+  }
+
+  /** The color at a lightness. */
+  at(lightness) {
+    return colorAt(lightness, this.paint.map((v) => v * shade(lightness)));
   }
 
   /** Shows the wheel at another lightness. */

@@ -1,4 +1,5 @@
-// The filmstrip: photos, which of them have strokes, and which to paint next.
+// The filmstrip: photos, how much of each the scene covers, which have strokes, and which to paint next.
+import { json } from "./talk.js";
 
 const at = (id) => document.getElementById(id);
 
@@ -10,11 +11,22 @@ export class Strip {
     this.items = photos.map(({ name }, k) => {
       const item = Object.assign(document.createElement("button"), { title: name });
       item.setAttribute("role", "option");
-      item.append(Object.assign(document.createElement("img"), { src: `paint/thumb/${k}`, alt: name, loading: "lazy" }));
+      const image = Object.assign(document.createElement("img"), { src: `paint/thumb/${k}`, alt: name, loading: "lazy" });
+      image.addEventListener("load", () => this.cover(item, k), { once: true });
+      item.append(image);
       item.addEventListener("click", () => chosen(k));
       return item;
     });
     at("strip").replaceChildren(...this.items);
+  }
+
+  /** Shows how much of a photo the scene covers; one is asked for after the other. */
+  cover(item, k) {
+    this.asked = (this.asked ?? Promise.resolve()).then(async () => {
+      const share = Math.round(100 * (await json(`cover/${k}`)));
+      item.title += `: the scene covers ${share} %`;
+      item.style.setProperty("--cover", `${share}%`);
+    }).catch(() => {});
   }
 
   /** Marks the photo that is shown. */

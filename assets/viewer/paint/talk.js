@@ -32,6 +32,8 @@ async function get(place, needed = true) {
   return answer;
 }
 
+export const json = async (place) => (await get(place)).json();
+
 /** A picture; null where it is not there and not needed. */
 export async function bitmap(place, needed = true) {
   const answer = await get(place, needed);

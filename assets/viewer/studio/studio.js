@@ -63,15 +63,15 @@ function job({ number, phase, step, doing, warnings, url, command, makes, subjec
   const said = { going: "", stopping: "stopping: it writes what it needs to continue", stopped: "stopped", done: "done", failed: "failed" }[phase];
   const head = element("div", { className: "row" }, element("h3", { textContent: `${does} ${subject ?? ""}${said && ` · ${said}`}` }));
   const buttons = element("div", { className: "row" });
-  if (url) buttons.append(element("a", { className: "button main", href: url, target: "_blank", rel: "noopener", textContent: "Open" }));
-  if (goes) buttons.append(button(url ? "Close" : "Stop", { do: "stop", job: number }, { disabled: phase === "stopping" }));
+  if (url) buttons.append(element("a", { className: "button main", href: url, target: "_blank", rel: "noopener", textContent: makes ? "Watch" : "Open" }));
+  if (goes) buttons.append(button(url && !makes ? "Close" : "Stop", { do: "stop", job: number }, { disabled: phase === "stopping" }));
   head.append(buttons);
   const card = element("article", { className: "card job" }, head);
   card.dataset.phase = phase;
   if (makes && step) card.append(steps(step));
   const share = goes ? shareOf(doing) : null;
   if (share !== null) card.append(element("progress", { value: share }));
-  if (doing && !url && phase !== "done") card.append(element("p", { textContent: doing, className: phase === "failed" ? "bad" : "" }));
+  if (doing && (makes || !url) && phase !== "done") card.append(element("p", { textContent: doing, className: phase === "failed" ? "bad" : "" }));
   if (warnings.length > 0) {
     const list = element("ul", {}, ...warnings.map((warning) => element("li", { textContent: warning })));
     card.append(element("details", { open: goes }, element("summary", { textContent: `${warnings.length} warnings` }), list));
