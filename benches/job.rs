@@ -6,8 +6,8 @@
 //!
 //! `OLD` is an older `gs-chroma`. Each program takes its turn with each command on the bundled
 //! scene, and with `auto` of `FILM` (tools/make_film.py makes one), which is stopped once the colored
-//! film is there. The table has medians over the turns, and new by old. What the programs started
-//! themselves counts, too.
+//! film is there. Each cost is printed as it is known; the table at the end has medians over the turns,
+//! and new by old. What the programs started themselves counts, too.
 
 use std::{
     error::Error,
@@ -132,7 +132,11 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         folders.iter().try_for_each(fs::create_dir)?;
         for (stage, costs) in stages.iter().zip(&mut costs) {
             for ((program, folder), costs) in programs.iter().zip(&folders).zip(costs) {
-                costs.push(stage.cost(program, folder)?);
+                let cost = stage.cost(program, folder)?;
+                let [cpu, wall] = cost;
+                let name = stage.arguments[0].display();
+                eprintln!("{name}, {}: {cpu:.1} CPU s, {wall:.1} s", program.display());
+                costs.push(cost);
             }
         }
         folders.iter().try_for_each(fs::remove_dir_all)?;
