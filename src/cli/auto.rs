@@ -41,7 +41,7 @@ const FALLBACKS: &[(Fallback, &str)] = &[
 /// a scene of its own, and all become one film; --shot or --start chooses one. Steps whose result
 /// is there are skipped, so the same command continues after an interruption.
 #[derive(Args)]
-#[command(after_long_help = "Example:
+#[command(mut_arg("view", |arg| arg.hide_short_help(true)), after_long_help = "Example:
   gs-chroma teacher fetch ddcolor-tiny
   gs-chroma auto photos/ --teacher ddcolor-tiny -o out
   gs-chroma auto film.mp4 --start 1:05 --seconds 20 --teacher ddcolor-tiny -o out")]
