@@ -45,7 +45,7 @@ const FALLBACKS: &[(Fallback, &str)] = &[
 /// own, and all become one film; --shot or --start chooses one. Steps whose result is there are
 /// skipped, so the same command continues after an interruption.
 #[derive(Args)]
-#[command(after_long_help = "Example:
+#[command(mut_arg("view", |arg| arg.hide_short_help(true)), after_long_help = "Example:
   gs-chroma teacher fetch ddcolor-tiny
   gs-chroma auto photos/ --teacher ddcolor-tiny -o out
   gs-chroma auto film.mp4 --start 1:05 --end 1:25 --teacher ddcolor-tiny -o out")]
