@@ -64,7 +64,11 @@ impl PaintSession {
             (&settings, PIXELS),
             start,
         )?;
-        let doing = "colors".to_owned();
+        let doing = match unknown {
+            true => "colors".to_owned(),
+            // A stroke ends the solve.
+            false => "colors; you can paint already".to_owned(),
+        };
         self.tell(Phase::Opening { doing });
         if unknown {
             repainter.solve(&AtomicBool::new(false), &mut |_| {})?;
