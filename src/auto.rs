@@ -116,6 +116,16 @@ pub struct Results {
     pub camera: Option<CameraMotion>,
 }
 
+impl Results {
+    /// Name of what is in color.
+    pub fn colored_as(&self) -> &'static str {
+        match self.colored.extension() {
+            Some(_) => "the film in color",
+            None => "the photos in color",
+        }
+    }
+}
+
 #[derive(Debug, thiserror::Error)]
 pub enum AutoError {
     /// Frames or poses.
@@ -260,8 +270,8 @@ fn make_results(
                 done.carried, done.photos
             )));
         }
-        let path = results.colored.display();
-        observe(Event::Note(format!("the photos in color are ready: {path}")));
+        let (what, path) = (results.colored_as(), results.colored.display());
+        observe(Event::Note(format!("ready: {path}, {what}")));
         Ok(())
     })?;
 

@@ -184,10 +184,8 @@ impl Distill<'_> {
         settings.correct_views &= uncorrected.get().is_none();
         let between = &mut |solver: &mut dyn Interruptible| {
             let rounds = last.get().map(|last| last.iteration);
-            if settings.correct_views
-                && uncorrected.get().is_none()
-                && rounds == Some(DECIDED_AFTER)
-            {
+            let decides = rounds == Some(DECIDED_AFTER) && DECIDED_AFTER < settings.rounds;
+            if settings.correct_views && uncorrected.get().is_none() && decides {
                 uncorrected.set(self.useless(&solver.corrections()?));
                 if uncorrected.get().is_some() {
                     solver.uncorrect();

@@ -131,7 +131,12 @@ impl Auto {
         let mut progress = Progress::default();
         let fallback = self.fallback;
         let steps = Step::ALL.len() - usize::from(options.without_eval);
-        let heading = |step: Step, more: &str| {
+        // Shots are looked for before a film of one shot is prepared.
+        let mut begun = None;
+        let mut heading = |step: Step, more: &str| {
+            if begun.replace(step) == Some(step) && more.is_empty() {
+                return;
+            }
             let place = Step::ALL.iter().position(|&other| other == step);
             let place = place.unwrap_or_default() + 1;
             eprintln!("step {place} of {steps}, {}{more}", step.command());
@@ -193,7 +198,7 @@ fn of_reel(made: &Reel) -> String {
 /// Paths of the results, a line each.
 fn in_words(results: &Results) -> String {
     let mut lines: Vec<(&Path, &str)> = vec![
-        (&results.colored, "the photos in color"),
+        (&results.colored, results.colored_as()),
         (&results.scene, "the scene, for viewers of splats"),
         (
             &results.contact_sheet,

@@ -51,7 +51,7 @@ impl View {
         let observe = &mut |event| progress.show(&event);
         if self.paint {
             let session = PaintSession::open(run, colmap, observe)?;
-            let name = session.scene.viewed.name.clone();
+            let name = format!("{}, to be painted on", session.scene.viewed.name);
             let content = PaintContent::new(session);
             let server = Server::bind(self.port)?.taking();
             progress.finish();

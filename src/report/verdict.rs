@@ -14,7 +14,7 @@ const TIMES: f64 = 1.5;
 /// Colorfulness below which it rounds to nothing.
 const COLORLESS: f64 = 0.05;
 
-/// ΔE00 below which is invisible a difference, and below which is hard to see it.
+/// ΔE00 below which a difference is invisible, and below which it is hard to see.
 const UNSEEN: f64 = 1.0;
 const FAINT: f64 = 2.0;
 

@@ -105,7 +105,7 @@ pub fn eval(
     let detector = options.detector.as_deref().map(Detector::open);
     let detector = detector.transpose()?;
     let mut teacher = match ask(options, &run, &scene, observe) {
-        Err(RunError::Teacher(error)) if !named => {
+        Err(error @ (RunError::Teacher(_) | RunError::TeacherCoversNothing { .. })) if !named => {
             observe(Event::Warning(format!(
                 "the run's teacher is not measured: {error}"
             )));

@@ -9,7 +9,7 @@
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { parseArgs } from "node:util";
-import { launch } from "./browser.mjs";
+import { finish, launch } from "./browser.mjs";
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,
@@ -131,7 +131,5 @@ try {
 } catch (error) {
   found.errors.push(String(error));
 } finally {
-  await browser.close();
+  await finish(browser, found);
 }
-console.log(JSON.stringify(found));
-process.exitCode = found.errors.length > 0 ? 1 : 0;

@@ -9,7 +9,7 @@
 // saved, and errors; status 1 where there are any.
 import { readFileSync } from "node:fs";
 import { parseArgs } from "node:util";
-import { launch } from "./browser.mjs";
+import { finish, launch } from "./browser.mjs";
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,
@@ -81,7 +81,5 @@ try {
 } catch (error) {
   found.errors.push(String(error));
 } finally {
-  await browser.close();
+  await finish(browser, found);
 }
-console.log(JSON.stringify(found));
-process.exitCode = found.errors.length > 0 ? 1 : 0;
